@@ -20,3 +20,22 @@ step() {
     fi
     printf '=== %s: %s s\n' "$title" "$((SECONDS - begin))"
 }
+
+# together TITLE SCRIPT TITLE SCRIPT...: steps that keep one core busy each and share nothing that they write, as many
+# at a time as there are cores.  What each prints appears when it has ended, in the order given.
+together() {
+    local logs pids=() status=0 i
+    logs="$(mktemp -d)"
+    while [ $# -gt 0 ]; do
+        while [ "$(jobs -pr | wc -l)" -ge "$(nproc)" ]; do sleep 0.2; done
+        step "$1" bash "$2" >"$logs/${#pids[@]}" 2>&1 &
+        pids+=($!)
+        shift 2
+    done
+    for i in "${!pids[@]}"; do
+        wait "${pids[$i]}" || status=$?
+        cat "$logs/$i"
+    done
+    rm -r "$logs"
+    [ "$status" -eq 0 ] || exit "$status"
+}

@@ -6,4 +6,4 @@ source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
 peers="$ROOT/.venv-peers"
 [ -x "$peers/bin/python" ] || python3 -m venv "$peers"
 "$peers/bin/pip" install -q -e '.[peers]'
-"$peers/bin/python" -m pytest -q -n logical --dist loadfile tests/other_programs
+"$peers/bin/python" -m pytest -q -n logical --dist loadfile tests/peers

@@ -20,6 +20,7 @@ extensions = [
     "tooling.drawings",
     "tooling.gallery",
     "tooling.docstrings",
+    "tooling.members",
 ]
 html_theme = "furo"
 html_title = "mstmm"

@@ -67,7 +67,7 @@ static const mstmm_port mstmm_body_rigid_inertia_outputs[] = {
     {"S", 21, "", 0, 0},
 };
 
-/* load that the bias motion of the rigid body needs
+/* load required by the bias motion of the rigid body
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.25)
  * in  p[10] parameters: mass [kg], mcx [kg*m], mcy [kg*m], mcz [kg*m], Jxx [kg*m2], Jxy [kg*m2], Jxz [kg*m2], Jyy [kg*m2], Jyz [kg*m2], Jzz [kg*m2]; body axes, about its input end
  * in  motion[9] bias motion of the body: w, wd, rdd of its P, own axes
@@ -606,7 +606,7 @@ static const mstmm_kernel mstmm_body_rigid_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_body_rigid_bias_load_inputs,
         .outputs = mstmm_body_rigid_bias_load_outputs,
-        .ir_hash = "77bd0b3d8c098908a29bdf530413bc334f4786bd67a219ec3470e990ca8be19f",
+        .ir_hash = "19f010227d166c8285f188e124c49ed67e8cc6ff90d7b9c8a49e8dd4da43a78f",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -652,7 +652,7 @@ const mstmm_element mstmm_body_rigid = {
     .abi = MSTMM_ABI,
     .kind = "body",
     .name = "rigid",
-    .hash = "06a7e79be8a5edc768290a0d13f5bf3cda818cacfdb3756dfbff6d25d3cfe5b2",
+    .hash = "dfb605181739088faa6c0d9275b13a9c9ebbc0010b3e0b553c46ef5835c3c984",
     .nq = 0,
     .nu = 0,
     .np = 10,

@@ -10,13 +10,13 @@
 #include "derivative_direction.h"
 #include "complex_lanes.h"
 
-/* change of a load by place carried to the parent
+/* change of a load by the pose, carried to the parent
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
- * in  S_p[9][6] change of the load by the place, a row an entry
- * out T_p[9][6] S_p Th_p, a row an entry
+ * in  S_p[9][6] change of the load by the pose, one row per entry
+ * out T_p[9][6] S_p Th_p, one row per entry
  * out T_w[3][6] S_p Th_z by angular velocity, added to what is there
  * out S_pI[9][6] that of the parent, added to what is there
  * out S_wI[3][6] the parent's S, of it that, added to what is there
@@ -1072,14 +1072,14 @@ static int mstmm_complex_sweep_frames_placed_carry(const double *restrict Rc, co
     return 0;
 }
 
-/* change of a body's place by the motion of its parent
+/* change of a body's pose by the motion of its parent
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  z_I[9] change of the parent's motion, parent axes
- * in  p_I[9] change of the parent's place, parent axes
- * out p[9] change of place: turn, place and velocity of P, own axes
+ * in  p_I[9] change of the parent's pose, parent axes
+ * out p[9] change of pose: rotation, position and velocity of P, own axes
  */
 static int mstmm_complex_sweep_frames_placed_moved(const double *restrict Rc, const double *restrict r,
     const mstmm_complex *restrict z_I, const mstmm_complex *restrict p_I, mstmm_complex *restrict p)
@@ -1173,8 +1173,8 @@ static int mstmm_complex_sweep_frames_placed_moved(const double *restrict Rc, co
  * in  w_I[3] (rad/s) angular velocity of the parent, parent axes
  * in  v[3] (m/s) relative velocity of the hinge, body axes
  * in  w[3] (rad/s) relative angular velocity of the hinge, body axes
- * in  S[9][6] change of the load by that of the motion, a row an entry
- * out T[9][6] S Th, a row an entry
+ * in  S[9][6] change of the load by that of the motion, one row per entry
+ * out T[9][6] S Th, one row per entry
  * out S_I[9][6] that of the parent, added to what is there
  */
 static int mstmm_complex_sweep_frames_tangent_carry(const double *restrict Rc, const double *restrict r,
@@ -2453,7 +2453,7 @@ static int mstmm_complex_sweep_frames_transport(const double *restrict Rc, const
     return 0;
 }
 
-/* unknowns of a hinge with 1 free speed that answer a right-hand side
+/* solution of a hinge with 1 free speed for a right-hand side
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -2464,7 +2464,7 @@ static int mstmm_complex_sweep_frames_transport(const double *restrict Rc, const
  * in  z_I[9] change of the parent's motion, parent axes
  * in  B[1][9] motion along the unknowns
  * in  gain[1][9] D^-1 times the rows by the motion
- * in  y[1] D^-1 times what is left of the rows
+ * in  y[1] D^-1 times the remainder of the rows
  * out x[1] unknowns
  * out z[9] change of the body's motion, own axes
  */
@@ -2648,7 +2648,7 @@ static int mstmm_complex_sweep_generic1_tangent_answer(const double *restrict Rc
     return 0;
 }
 
-/* unknowns of a hinge with 2 free speeds that answer a right-hand side
+/* solution of a hinge with 2 free speeds for a right-hand side
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -2659,7 +2659,7 @@ static int mstmm_complex_sweep_generic1_tangent_answer(const double *restrict Rc
  * in  z_I[9] change of the parent's motion, parent axes
  * in  B[2][9] motion along the unknowns
  * in  gain[2][9] D^-1 times the rows by the motion
- * in  y[2] D^-1 times what is left of the rows
+ * in  y[2] D^-1 times the remainder of the rows
  * out x[2] unknowns
  * out z[9] change of the body's motion, own axes
  */
@@ -2880,7 +2880,7 @@ static int mstmm_complex_sweep_generic2_tangent_answer(const double *restrict Rc
     return 0;
 }
 
-/* unknowns of a hinge with 3 free speeds that answer a right-hand side
+/* solution of a hinge with 3 free speeds for a right-hand side
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -2891,7 +2891,7 @@ static int mstmm_complex_sweep_generic2_tangent_answer(const double *restrict Rc
  * in  z_I[9] change of the parent's motion, parent axes
  * in  B[3][9] motion along the unknowns
  * in  gain[3][9] D^-1 times the rows by the motion
- * in  y[3] D^-1 times what is left of the rows
+ * in  y[3] D^-1 times the remainder of the rows
  * out x[3] unknowns
  * out z[9] change of the body's motion, own axes
  */
@@ -3149,7 +3149,7 @@ static int mstmm_complex_sweep_generic3_tangent_answer(const double *restrict Rc
     return 0;
 }
 
-/* unknowns of a hinge with 4 free speeds that answer a right-hand side
+/* solution of a hinge with 4 free speeds for a right-hand side
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -3160,7 +3160,7 @@ static int mstmm_complex_sweep_generic3_tangent_answer(const double *restrict Rc
  * in  z_I[9] change of the parent's motion, parent axes
  * in  B[4][9] motion along the unknowns
  * in  gain[4][9] D^-1 times the rows by the motion
- * in  y[4] D^-1 times what is left of the rows
+ * in  y[4] D^-1 times the remainder of the rows
  * out x[4] unknowns
  * out z[9] change of the body's motion, own axes
  */
@@ -3455,7 +3455,7 @@ static int mstmm_complex_sweep_generic4_tangent_answer(const double *restrict Rc
     return 0;
 }
 
-/* unknowns of a hinge with 5 free speeds that answer a right-hand side
+/* solution of a hinge with 5 free speeds for a right-hand side
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -3466,7 +3466,7 @@ static int mstmm_complex_sweep_generic4_tangent_answer(const double *restrict Rc
  * in  z_I[9] change of the parent's motion, parent axes
  * in  B[5][9] motion along the unknowns
  * in  gain[5][9] D^-1 times the rows by the motion
- * in  y[5] D^-1 times what is left of the rows
+ * in  y[5] D^-1 times the remainder of the rows
  * out x[5] unknowns
  * out z[9] change of the body's motion, own axes
  */
@@ -3798,7 +3798,7 @@ static int mstmm_complex_sweep_generic5_tangent_answer(const double *restrict Rc
     return 0;
 }
 
-/* unknowns of a hinge with 6 free speeds that answer a right-hand side
+/* solution of a hinge with 6 free speeds for a right-hand side
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -3809,7 +3809,7 @@ static int mstmm_complex_sweep_generic5_tangent_answer(const double *restrict Rc
  * in  z_I[9] change of the parent's motion, parent axes
  * in  B[6][9] motion along the unknowns
  * in  gain[6][9] D^-1 times the rows by the motion
- * in  y[6] D^-1 times what is left of the rows
+ * in  y[6] D^-1 times the remainder of the rows
  * out x[6] unknowns
  * out z[9] change of the body's motion, own axes
  */
@@ -4184,11 +4184,11 @@ static int mstmm_complex_sweep_generic6_tangent_answer(const double *restrict Rc
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6] motion subspace of the unknowns
- * in  V[1][6] K + G, a row a direction
+ * in  V[1][6] K + G, one row per direction
  * in  inverse[1] D^-1
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  e_f[1] load of the rows
- * out y[1] D^-1 times what is left of the rows
+ * out y[1] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
 static int mstmm_complex_sweep_generic1_tangent_push(const double *restrict Rc, const double *restrict r,
@@ -4312,11 +4312,11 @@ static int mstmm_complex_sweep_generic1_tangent_push(const double *restrict Rc, 
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][2] motion subspace of the unknowns
- * in  V[2][6] K + G, a row a direction
+ * in  V[2][6] K + G, one row per direction
  * in  inverse[2][2] D^-1
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  e_f[2] load of the rows
- * out y[2] D^-1 times what is left of the rows
+ * out y[2] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
 static int mstmm_complex_sweep_generic2_tangent_push(const double *restrict Rc, const double *restrict r,
@@ -4471,11 +4471,11 @@ static int mstmm_complex_sweep_generic2_tangent_push(const double *restrict Rc, 
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][3] motion subspace of the unknowns
- * in  V[3][6] K + G, a row a direction
+ * in  V[3][6] K + G, one row per direction
  * in  inverse[3][3] D^-1
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  e_f[3] load of the rows
- * out y[3] D^-1 times what is left of the rows
+ * out y[3] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
 static int mstmm_complex_sweep_generic3_tangent_push(const double *restrict Rc, const double *restrict r,
@@ -4665,11 +4665,11 @@ static int mstmm_complex_sweep_generic3_tangent_push(const double *restrict Rc, 
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][4] motion subspace of the unknowns
- * in  V[4][6] K + G, a row a direction
+ * in  V[4][6] K + G, one row per direction
  * in  inverse[4][4] D^-1
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  e_f[4] load of the rows
- * out y[4] D^-1 times what is left of the rows
+ * out y[4] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
 static int mstmm_complex_sweep_generic4_tangent_push(const double *restrict Rc, const double *restrict r,
@@ -4898,11 +4898,11 @@ static int mstmm_complex_sweep_generic4_tangent_push(const double *restrict Rc, 
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][5] motion subspace of the unknowns
- * in  V[5][6] K + G, a row a direction
+ * in  V[5][6] K + G, one row per direction
  * in  inverse[5][5] D^-1
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  e_f[5] load of the rows
- * out y[5] D^-1 times what is left of the rows
+ * out y[5] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
 static int mstmm_complex_sweep_generic5_tangent_push(const double *restrict Rc, const double *restrict r,
@@ -5174,11 +5174,11 @@ static int mstmm_complex_sweep_generic5_tangent_push(const double *restrict Rc, 
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][6] motion subspace of the unknowns
- * in  V[6][6] K + G, a row a direction
+ * in  V[6][6] K + G, one row per direction
  * in  inverse[6][6] D^-1
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  e_f[6] load of the rows
- * out y[6] D^-1 times what is left of the rows
+ * out y[6] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
 static int mstmm_complex_sweep_generic6_tangent_push(const double *restrict Rc, const double *restrict r,
@@ -5496,11 +5496,11 @@ static int mstmm_complex_sweep_generic6_tangent_push(const double *restrict Rc, 
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  inverse[1] D^-1
  * in  right[1][9] rows by the motion
- * in  K[1][6] S B, a row a direction
- * in  G[1][6] change of the load that is carried
+ * in  K[1][6] S B, one row per direction
+ * in  G[1][6] change of the carried load
  * out gain[1][9] D^-1 times the rows by the motion
- * out V[1][6] K + G, a row a direction
- * out S[9][6] change of the load by that of the motion, a row an entry, added to what is there
+ * out V[1][6] K + G, one row per direction
+ * out S[9][6] change of the load by that of the motion, one row per entry, added to what is there
  */
 static int mstmm_complex_sweep_generic1_tangent_reduce(const mstmm_complex *restrict inverse, const mstmm_complex *restrict right,
     const mstmm_complex *restrict K, const mstmm_complex *restrict G, mstmm_complex *restrict gain, mstmm_complex *restrict V,
@@ -5706,11 +5706,11 @@ static int mstmm_complex_sweep_generic1_tangent_reduce(const mstmm_complex *rest
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  inverse[2][2] D^-1
  * in  right[2][9] rows by the motion
- * in  K[2][6] S B, a row a direction
- * in  G[2][6] change of the load that is carried
+ * in  K[2][6] S B, one row per direction
+ * in  G[2][6] change of the carried load
  * out gain[2][9] D^-1 times the rows by the motion
- * out V[2][6] K + G, a row a direction
- * out S[9][6] change of the load by that of the motion, a row an entry, added to what is there
+ * out V[2][6] K + G, one row per direction
+ * out S[9][6] change of the load by that of the motion, one row per entry, added to what is there
  */
 static int mstmm_complex_sweep_generic2_tangent_reduce(const mstmm_complex *restrict inverse, const mstmm_complex *restrict right,
     const mstmm_complex *restrict K, const mstmm_complex *restrict G, mstmm_complex *restrict gain, mstmm_complex *restrict V,
@@ -6090,11 +6090,11 @@ static int mstmm_complex_sweep_generic2_tangent_reduce(const mstmm_complex *rest
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  inverse[3][3] D^-1
  * in  right[3][9] rows by the motion
- * in  K[3][6] S B, a row a direction
- * in  G[3][6] change of the load that is carried
+ * in  K[3][6] S B, one row per direction
+ * in  G[3][6] change of the carried load
  * out gain[3][9] D^-1 times the rows by the motion
- * out V[3][6] K + G, a row a direction
- * out S[9][6] change of the load by that of the motion, a row an entry, added to what is there
+ * out V[3][6] K + G, one row per direction
+ * out S[9][6] change of the load by that of the motion, one row per entry, added to what is there
  */
 static int mstmm_complex_sweep_generic3_tangent_reduce(const mstmm_complex *restrict inverse, const mstmm_complex *restrict right,
     const mstmm_complex *restrict K, const mstmm_complex *restrict G, mstmm_complex *restrict gain, mstmm_complex *restrict V,
@@ -6684,11 +6684,11 @@ static int mstmm_complex_sweep_generic3_tangent_reduce(const mstmm_complex *rest
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  inverse[4][4] D^-1
  * in  right[4][9] rows by the motion
- * in  K[4][6] S B, a row a direction
- * in  G[4][6] change of the load that is carried
+ * in  K[4][6] S B, one row per direction
+ * in  G[4][6] change of the carried load
  * out gain[4][9] D^-1 times the rows by the motion
- * out V[4][6] K + G, a row a direction
- * out S[9][6] change of the load by that of the motion, a row an entry, added to what is there
+ * out V[4][6] K + G, one row per direction
+ * out S[9][6] change of the load by that of the motion, one row per entry, added to what is there
  */
 static int mstmm_complex_sweep_generic4_tangent_reduce(const mstmm_complex *restrict inverse, const mstmm_complex *restrict right,
     const mstmm_complex *restrict K, const mstmm_complex *restrict G, mstmm_complex *restrict gain, mstmm_complex *restrict V,
@@ -7524,11 +7524,11 @@ static int mstmm_complex_sweep_generic4_tangent_reduce(const mstmm_complex *rest
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  inverse[5][5] D^-1
  * in  right[5][9] rows by the motion
- * in  K[5][6] S B, a row a direction
- * in  G[5][6] change of the load that is carried
+ * in  K[5][6] S B, one row per direction
+ * in  G[5][6] change of the carried load
  * out gain[5][9] D^-1 times the rows by the motion
- * out V[5][6] K + G, a row a direction
- * out S[9][6] change of the load by that of the motion, a row an entry, added to what is there
+ * out V[5][6] K + G, one row per direction
+ * out S[9][6] change of the load by that of the motion, one row per entry, added to what is there
  */
 static int mstmm_complex_sweep_generic5_tangent_reduce(const mstmm_complex *restrict inverse, const mstmm_complex *restrict right,
     const mstmm_complex *restrict K, const mstmm_complex *restrict G, mstmm_complex *restrict gain, mstmm_complex *restrict V,
@@ -8646,11 +8646,11 @@ static int mstmm_complex_sweep_generic5_tangent_reduce(const mstmm_complex *rest
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  inverse[6][6] D^-1
  * in  right[6][9] rows by the motion
- * in  K[6][6] S B, a row a direction
- * in  G[6][6] change of the load that is carried
+ * in  K[6][6] S B, one row per direction
+ * in  G[6][6] change of the carried load
  * out gain[6][9] D^-1 times the rows by the motion
- * out V[6][6] K + G, a row a direction
- * out S[9][6] change of the load by that of the motion, a row an entry, added to what is there
+ * out V[6][6] K + G, one row per direction
+ * out S[9][6] change of the load by that of the motion, one row per entry, added to what is there
  */
 static int mstmm_complex_sweep_generic6_tangent_reduce(const mstmm_complex *restrict inverse, const mstmm_complex *restrict right,
     const mstmm_complex *restrict K, const mstmm_complex *restrict G, mstmm_complex *restrict gain, mstmm_complex *restrict V,
@@ -10086,9 +10086,9 @@ static int mstmm_complex_sweep_generic6_tangent_reduce(const mstmm_complex *rest
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  H[6] motion subspace of the unknowns
  * in  B[1][9] motion along the unknowns
- * in  W[1] slopes of the rows, a row a direction
- * in  S[9][6] change of the load by that of the motion, a row an entry
- * out K[1][6] S B, a row a direction
+ * in  W[1] derivatives of the rows, one row per direction
+ * in  S[9][6] change of the load by that of the motion, one row per entry
+ * out K[1][6] S B, one row per direction
  * out right[1][9] rows by the motion
  * out D[1] rows by unknowns
  * out one[1] unit matrix
@@ -10335,9 +10335,9 @@ static int mstmm_complex_sweep_generic1_tangent_rows(const double *restrict H, c
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  H[6][2] motion subspace of the unknowns
  * in  B[2][9] motion along the unknowns
- * in  W[2][2] slopes of the rows, a row a direction
- * in  S[9][6] change of the load by that of the motion, a row an entry
- * out K[2][6] S B, a row a direction
+ * in  W[2][2] derivatives of the rows, one row per direction
+ * in  S[9][6] change of the load by that of the motion, one row per entry
+ * out K[2][6] S B, one row per direction
  * out right[2][9] rows by the motion
  * out D[2][2] rows by unknowns
  * out one[2][2] unit matrix
@@ -10842,9 +10842,9 @@ static int mstmm_complex_sweep_generic2_tangent_rows(const double *restrict H, c
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  H[6][3] motion subspace of the unknowns
  * in  B[3][9] motion along the unknowns
- * in  W[3][3] slopes of the rows, a row a direction
- * in  S[9][6] change of the load by that of the motion, a row an entry
- * out K[3][6] S B, a row a direction
+ * in  W[3][3] derivatives of the rows, one row per direction
+ * in  S[9][6] change of the load by that of the motion, one row per entry
+ * out K[3][6] S B, one row per direction
  * out right[3][9] rows by the motion
  * out D[3][3] rows by unknowns
  * out one[3][3] unit matrix
@@ -11635,9 +11635,9 @@ static int mstmm_complex_sweep_generic3_tangent_rows(const double *restrict H, c
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  H[6][4] motion subspace of the unknowns
  * in  B[4][9] motion along the unknowns
- * in  W[4][4] slopes of the rows, a row a direction
- * in  S[9][6] change of the load by that of the motion, a row an entry
- * out K[4][6] S B, a row a direction
+ * in  W[4][4] derivatives of the rows, one row per direction
+ * in  S[9][6] change of the load by that of the motion, one row per entry
+ * out K[4][6] S B, one row per direction
  * out right[4][9] rows by the motion
  * out D[4][4] rows by unknowns
  * out one[4][4] unit matrix
@@ -12742,9 +12742,9 @@ static int mstmm_complex_sweep_generic4_tangent_rows(const double *restrict H, c
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  H[6][5] motion subspace of the unknowns
  * in  B[5][9] motion along the unknowns
- * in  W[5][5] slopes of the rows, a row a direction
- * in  S[9][6] change of the load by that of the motion, a row an entry
- * out K[5][6] S B, a row a direction
+ * in  W[5][5] derivatives of the rows, one row per direction
+ * in  S[9][6] change of the load by that of the motion, one row per entry
+ * out K[5][6] S B, one row per direction
  * out right[5][9] rows by the motion
  * out D[5][5] rows by unknowns
  * out one[5][5] unit matrix
@@ -14191,9 +14191,9 @@ static int mstmm_complex_sweep_generic5_tangent_rows(const double *restrict H, c
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  H[6][6] motion subspace of the unknowns
  * in  B[6][9] motion along the unknowns
- * in  W[6][6] slopes of the rows, a row a direction
- * in  S[9][6] change of the load by that of the motion, a row an entry
- * out K[6][6] S B, a row a direction
+ * in  W[6][6] derivatives of the rows, one row per direction
+ * in  S[9][6] change of the load by that of the motion, one row per entry
+ * out K[6][6] S B, one row per direction
  * out right[6][9] rows by the motion
  * out D[6][6] rows by unknowns
  * out one[6][6] unit matrix
@@ -16010,7 +16010,7 @@ static int mstmm_complex_sweep_generic6_tangent_rows(const double *restrict H, c
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  H[6][n] motion subspace of the modes, rows v then w, outboard axes
  * in  e[6] (N, N*m) force part of f = S a + e, at P
- * in  e_f[n] load that the modes need
+ * in  e_f[n] load required by the modes
  * out tau[n] efforts on the modes
  */
 static inline __attribute__((always_inline))
@@ -16038,7 +16038,7 @@ int mstmm_complex_sweep_modal_modal_effort_sized(int n, const double *restrict H
 static int mstmm_complex_sweep_modal_modal_effort(int n, const double *restrict H, const mstmm_complex *restrict e,
     const mstmm_complex *restrict e_f, mstmm_complex *restrict tau)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_complex_sweep_modal_modal_effort_sized(1, H, e, e_f, tau);
     case 2: return mstmm_complex_sweep_modal_modal_effort_sized(2, H, e, e_f, tau);
     case 3: return mstmm_complex_sweep_modal_modal_effort_sized(3, H, e, e_f, tau);
@@ -16047,17 +16047,17 @@ static int mstmm_complex_sweep_modal_modal_effort(int n, const double *restrict 
     }
 }
 
-/* what hangs on a port, as the unknowns of its body see it
+/* part outboard of a port, along the unknowns of its body
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][n] motion subspace of the unknowns
  * in  B[n][9] motion along the unknowns
- * in  G[n][6] change of the load that is carried
- * in  W[n][n] slopes of the rows, a row a direction
- * in  S[9][6] change of the load by that of the motion, a row an entry
- * in  T[9][6] S Th, a row an entry
+ * in  G[n][6] change of the carried load
+ * in  W[n][n] derivatives of the rows, one row per direction
+ * in  S[9][6] change of the load by that of the motion, one row per entry
+ * in  T[9][6] S Th, one row per entry
  * out K_x[6][n] S B
  * out K[n][6], added to what is there
  * out Z_z[9][n], added to what is there
@@ -16460,7 +16460,7 @@ static int mstmm_complex_sweep_tangent_absorb(int n, const double *restrict Rc, 
     const mstmm_complex *restrict W, const mstmm_complex *restrict S, const mstmm_complex *restrict T, mstmm_complex *restrict K_x,
     mstmm_complex *restrict K, mstmm_complex *restrict Z_z, mstmm_complex *restrict Z_x)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_complex_sweep_tangent_absorb_sized(1, Rc, r, H, B, G, W, S, T, K_x, K, Z_z, Z_x);
     case 2: return mstmm_complex_sweep_tangent_absorb_sized(2, Rc, r, H, B, G, W, S, T, K_x, K, Z_z, Z_x);
     case 3: return mstmm_complex_sweep_tangent_absorb_sized(3, Rc, r, H, B, G, W, S, T, K_x, K, Z_z, Z_x);
@@ -16469,12 +16469,12 @@ static int mstmm_complex_sweep_tangent_absorb(int n, const double *restrict Rc, 
     }
 }
 
-/* unknowns that answer a right-hand side
+/* solution for a right-hand side
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  B[n][9] motion along the unknowns
  * in  gain[n][9] D^-1 times the rows by the motion
- * in  y[n] D^-1 times what is left of the rows
+ * in  y[n] D^-1 times the remainder of the rows
  * in  z_c[9] change of motion without the unknowns' part
  * out x[n] unknowns
  * out z[9] change of the body's motion, own axes
@@ -16573,7 +16573,7 @@ int mstmm_complex_sweep_tangent_answer_sized(int n, const mstmm_complex *restric
 static int mstmm_complex_sweep_tangent_answer(int n, const mstmm_complex *restrict B, const mstmm_complex *restrict gain,
     const mstmm_complex *restrict y, const mstmm_complex *restrict z_c, mstmm_complex *restrict x, mstmm_complex *restrict z)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_complex_sweep_tangent_answer_sized(1, B, gain, y, z_c, x, z);
     case 2: return mstmm_complex_sweep_tangent_answer_sized(2, B, gain, y, z_c, x, z);
     case 3: return mstmm_complex_sweep_tangent_answer_sized(3, B, gain, y, z_c, x, z);
@@ -16663,7 +16663,7 @@ int mstmm_complex_sweep_tangent_displaced_sized(int n, const mstmm_complex *rest
 static int mstmm_complex_sweep_tangent_displaced(int n, const mstmm_complex *restrict B, const mstmm_complex *restrict x,
     const mstmm_complex *restrict z_c, mstmm_complex *restrict z)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_complex_sweep_tangent_displaced_sized(1, B, x, z_c, z);
     case 2: return mstmm_complex_sweep_tangent_displaced_sized(2, B, x, z_c, z);
     case 3: return mstmm_complex_sweep_tangent_displaced_sized(3, B, x, z_c, z);
@@ -16692,7 +16692,7 @@ int mstmm_complex_sweep_tangent_invert_sized(int n, const mstmm_complex *restric
 static int mstmm_complex_sweep_tangent_invert(int n, const mstmm_complex *restrict D, const mstmm_complex *restrict one,
     mstmm_complex *restrict inverse, mstmm_complex *restrict work)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_complex_sweep_tangent_invert_sized(1, D, one, inverse, work);
     case 2: return mstmm_complex_sweep_tangent_invert_sized(2, D, one, inverse, work);
     case 3: return mstmm_complex_sweep_tangent_invert_sized(3, D, one, inverse, work);
@@ -16706,17 +16706,17 @@ static int mstmm_complex_sweep_tangent_invert(int n, const mstmm_complex *restri
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  H[6][n] motion subspace of the unknowns
  * in  B[n][9] motion along the unknowns
- * in  G[n][6] change of the load that is carried
- * in  W[n][n] slopes of the rows, a row a direction
- * in  S[9][6] change of the load by that of the motion, a row an entry
+ * in  G[n][6] change of the carried load
+ * in  W[n][n] derivatives of the rows, one row per direction
+ * in  S[9][6] change of the load by that of the motion, one row per entry
  * in  K[n][6] own load along the unknowns
- * in  Z_z[9][n] own rows by the motion, a row an entry
- * in  Z_x[n][n] own rows by the unknowns, a row a direction
+ * in  Z_z[9][n] own rows by the motion, one row per entry
+ * in  Z_x[n][n] own rows by the unknowns, one row per direction
  * out V[6][n] K + G
  * out D[n][n] rows by unknowns
  * out right[n][9] rows by the motion
  * out gain[n][9] D^-1 times the rows by the motion
- * out S_c[9][6] S without the unknowns, a row an entry
+ * out S_c[9][6] S without the unknowns, one row per entry
  * out work[n][n] factor L, D of solve
  */
 static inline __attribute__((always_inline))
@@ -17526,7 +17526,7 @@ static int mstmm_complex_sweep_tangent_node(int n, const double *restrict H, con
     const mstmm_complex *restrict Z_z, const mstmm_complex *restrict Z_x, mstmm_complex *restrict V, mstmm_complex *restrict D,
     mstmm_complex *restrict right, mstmm_complex *restrict gain, mstmm_complex *restrict S_c, mstmm_complex *restrict work)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_complex_sweep_tangent_node_sized(1, H, B, G, W, S, K, Z_z, Z_x, V, D, right, gain, S_c, work);
     case 2: return mstmm_complex_sweep_tangent_node_sized(2, H, B, G, W, S, K, Z_z, Z_x, V, D, right, gain, S_c, work);
     case 3: return mstmm_complex_sweep_tangent_node_sized(3, H, B, G, W, S, K, Z_z, Z_x, V, D, right, gain, S_c, work);
@@ -17535,15 +17535,15 @@ static int mstmm_complex_sweep_tangent_node(int n, const double *restrict H, con
     }
 }
 
-/* loads by place of what hangs on a port, as the unknowns of its body see them
+/* loads by the pose of the part outboard of a port, along the unknowns of its body
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][n] motion subspace of the unknowns
- * in  B_p[n][9] change of place along the unknowns
- * in  S_p[9][6] change of the load by the place, a row an entry
- * in  T_p[9][6] S_p Th_p, a row an entry
+ * in  B_p[n][9] change of pose along the unknowns
+ * in  S_p[9][6] change of the load by the pose, one row per entry
+ * in  T_p[9][6] S_p Th_p, one row per entry
  * out K[n][6], added to what is there
  * out Z_p[9][n], added to what is there
  * out Z_x[n][n], added to what is there
@@ -18354,7 +18354,7 @@ static int mstmm_complex_sweep_tangent_placed_absorb(int n, const double *restri
     const double *restrict H, const mstmm_complex *restrict B_p, const mstmm_complex *restrict S_p,
     const mstmm_complex *restrict T_p, mstmm_complex *restrict K, mstmm_complex *restrict Z_p, mstmm_complex *restrict Z_x)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_complex_sweep_tangent_placed_absorb_sized(1, Rc, r, H, B_p, S_p, T_p, K, Z_p, Z_x);
     case 2: return mstmm_complex_sweep_tangent_placed_absorb_sized(2, Rc, r, H, B_p, S_p, T_p, K, Z_p, Z_x);
     case 3: return mstmm_complex_sweep_tangent_placed_absorb_sized(3, Rc, r, H, B_p, S_p, T_p, K, Z_p, Z_x);
@@ -18363,12 +18363,12 @@ static int mstmm_complex_sweep_tangent_placed_absorb(int n, const double *restri
     }
 }
 
-/* rows less what the change of place makes of them
+/* rows less their change by the change of pose
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  gain[n][9] D^-1 times the rows by the place
- * in  p[9] change of place: turn, place and velocity of P, own axes
- * out y[n] what is left of the rows, added to what is there
+ * in  gain[n][9] D^-1 times the rows by the pose
+ * in  p[9] change of pose: rotation, position and velocity of P, own axes
+ * out y[n] the remainder of the rows, added to what is there
  */
 static inline __attribute__((always_inline))
 int mstmm_complex_sweep_tangent_placed_left_sized(int n, const mstmm_complex *restrict gain, const mstmm_complex *restrict p,
@@ -18401,7 +18401,7 @@ int mstmm_complex_sweep_tangent_placed_left_sized(int n, const mstmm_complex *re
 static int mstmm_complex_sweep_tangent_placed_left(int n, const mstmm_complex *restrict gain, const mstmm_complex *restrict p,
     mstmm_complex *restrict y)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_complex_sweep_tangent_placed_left_sized(1, gain, p, y);
     case 2: return mstmm_complex_sweep_tangent_placed_left_sized(2, gain, p, y);
     case 3: return mstmm_complex_sweep_tangent_placed_left_sized(3, gain, p, y);
@@ -18410,17 +18410,17 @@ static int mstmm_complex_sweep_tangent_placed_left(int n, const mstmm_complex *r
     }
 }
 
-/* unknowns of a flexible body eliminated from loads by place
+/* unknowns of a flexible body eliminated from loads by the pose
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  H[6][n] motion subspace of the unknowns
  * in  V[6][n] K + G
  * in  D[n][n] rows by unknowns
- * in  S_p[9][6] change of the load by the place, a row an entry
- * in  Z_p[9][n] own rows by the place, a row an entry
- * out right[n][9] rows by the place
- * out gain[n][9] D^-1 times the rows by the place
- * out S_c[9][6] S_p without the unknowns, a row an entry
+ * in  S_p[9][6] change of the load by the pose, one row per entry
+ * in  Z_p[9][n] own rows by the pose, one row per entry
+ * out right[n][9] rows by the pose
+ * out gain[n][9] D^-1 times the rows by the pose
+ * out S_c[9][6] S_p without the unknowns, one row per entry
  * out work[n][n] factor L, D of solve
  */
 static inline __attribute__((always_inline))
@@ -18952,7 +18952,7 @@ static int mstmm_complex_sweep_tangent_placed_node(int n, const double *restrict
     const mstmm_complex *restrict D, const mstmm_complex *restrict S_p, const mstmm_complex *restrict Z_p,
     mstmm_complex *restrict right, mstmm_complex *restrict gain, mstmm_complex *restrict S_c, mstmm_complex *restrict work)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_complex_sweep_tangent_placed_node_sized(1, H, V, D, S_p, Z_p, right, gain, S_c, work);
     case 2: return mstmm_complex_sweep_tangent_placed_node_sized(2, H, V, D, S_p, Z_p, right, gain, S_c, work);
     case 3: return mstmm_complex_sweep_tangent_placed_node_sized(3, H, V, D, S_p, Z_p, right, gain, S_c, work);
@@ -18961,12 +18961,12 @@ static int mstmm_complex_sweep_tangent_placed_node(int n, const double *restrict
     }
 }
 
-/* load and rows along the unknowns by the change of place
+/* load and rows along the unknowns by the change of pose
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  B_p[n][9] change of place along the unknowns
- * in  S_p[9][6] change of the load by the place, a row an entry
- * in  Z_p[9][n] own rows by the place, a row an entry
+ * in  B_p[n][9] change of pose along the unknowns
+ * in  S_p[9][6] change of the load by the pose, one row per entry
+ * in  Z_p[9][n] own rows by the pose, one row per entry
  * out K[n][6], added to what is there
  * out Z_x[n][n], added to what is there
  */
@@ -19122,7 +19122,7 @@ int mstmm_complex_sweep_tangent_placed_own_sized(int n, const mstmm_complex *res
 static int mstmm_complex_sweep_tangent_placed_own(int n, const mstmm_complex *restrict B_p, const mstmm_complex *restrict S_p,
     const mstmm_complex *restrict Z_p, mstmm_complex *restrict K, mstmm_complex *restrict Z_x)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_complex_sweep_tangent_placed_own_sized(1, B_p, S_p, Z_p, K, Z_x);
     case 2: return mstmm_complex_sweep_tangent_placed_own_sized(2, B_p, S_p, Z_p, K, Z_x);
     case 3: return mstmm_complex_sweep_tangent_placed_own_sized(3, B_p, S_p, Z_p, K, Z_x);
@@ -19131,14 +19131,14 @@ static int mstmm_complex_sweep_tangent_placed_own(int n, const mstmm_complex *re
     }
 }
 
-/* unknowns of a hinge eliminated from loads by place
+/* unknowns of a hinge eliminated from loads by the pose
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  inverse[n][n] D^-1
- * in  Z_p[9][n] own rows by the place, a row an entry
- * in  V[n][6] K + G, a row a direction
- * out gain[n][9] D^-1 times the rows by the place
- * out S_p[9][6] change of the load by the place, a row an entry, added to what is there
+ * in  Z_p[9][n] own rows by the pose, one row per entry
+ * in  V[n][6] K + G, one row per direction
+ * out gain[n][9] D^-1 times the rows by the pose
+ * out S_p[9][6] change of the load by the pose, one row per entry, added to what is there
  */
 static inline __attribute__((always_inline))
 int mstmm_complex_sweep_tangent_placed_reduce_sized(int n, const mstmm_complex *restrict inverse,
@@ -19600,7 +19600,7 @@ int mstmm_complex_sweep_tangent_placed_reduce_sized(int n, const mstmm_complex *
 static int mstmm_complex_sweep_tangent_placed_reduce(int n, const mstmm_complex *restrict inverse, const mstmm_complex *restrict Z_p,
     const mstmm_complex *restrict V, mstmm_complex *restrict gain, mstmm_complex *restrict S_p)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_complex_sweep_tangent_placed_reduce_sized(1, inverse, Z_p, V, gain, S_p);
     case 2: return mstmm_complex_sweep_tangent_placed_reduce_sized(2, inverse, Z_p, V, gain, S_p);
     case 3: return mstmm_complex_sweep_tangent_placed_reduce_sized(3, inverse, Z_p, V, gain, S_p);
@@ -19609,12 +19609,12 @@ static int mstmm_complex_sweep_tangent_placed_reduce(int n, const mstmm_complex 
     }
 }
 
-/* rows of a hinge by the change of place
+/* rows of a hinge by the change of pose
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  H[6][n] motion subspace of the unknowns
- * in  S_p[9][6] change of the load by the place, a row an entry
- * out Z_p[9][n] rows by the place, a row an entry
+ * in  S_p[9][6] change of the load by the pose, one row per entry
+ * out Z_p[9][n] rows by the pose, one row per entry
  */
 static inline __attribute__((always_inline))
 int mstmm_complex_sweep_tangent_placed_rows_sized(int n, const double *restrict H, const mstmm_complex *restrict S_p,
@@ -19752,7 +19752,7 @@ int mstmm_complex_sweep_tangent_placed_rows_sized(int n, const double *restrict 
 static int mstmm_complex_sweep_tangent_placed_rows(int n, const double *restrict H, const mstmm_complex *restrict S_p,
     mstmm_complex *restrict Z_p)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_complex_sweep_tangent_placed_rows_sized(1, H, S_p, Z_p);
     case 2: return mstmm_complex_sweep_tangent_placed_rows_sized(2, H, S_p, Z_p);
     case 3: return mstmm_complex_sweep_tangent_placed_rows_sized(3, H, S_p, Z_p);
@@ -19769,8 +19769,8 @@ static int mstmm_complex_sweep_tangent_placed_rows(int n, const double *restrict
  * in  D[n][n] rows by unknowns
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  e_f[n] load of the rows
- * out rest[n] what is left of the rows
- * out y[n] D^-1 times what is left of the rows
+ * out rest[n] the remainder of the rows
+ * out y[n] D^-1 times the remainder of the rows
  * out e_c[6] (N, N*m) load without the unknowns
  * out work[n][n] factor L, D of solve
  */
@@ -19848,7 +19848,7 @@ static int mstmm_complex_sweep_tangent_push(int n, const double *restrict H, con
     const mstmm_complex *restrict D, const mstmm_complex *restrict e, const mstmm_complex *restrict e_f, mstmm_complex *restrict rest,
     mstmm_complex *restrict y, mstmm_complex *restrict e_c, mstmm_complex *restrict work)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_complex_sweep_tangent_push_sized(1, H, V, D, e, e_f, rest, y, e_c, work);
     case 2: return mstmm_complex_sweep_tangent_push_sized(2, H, V, D, e, e_f, rest, y, e_c, work);
     case 3: return mstmm_complex_sweep_tangent_push_sized(3, H, V, D, e, e_f, rest, y, e_c, work);
@@ -20284,7 +20284,7 @@ static int mstmm_complex_at_tangent_eliminated(mstmm_complex_state *state, int i
 static int mstmm_complex_at_tangent_column(mstmm_complex_state *state, int index);
 static int mstmm_complex_at_tangent_carried(mstmm_complex_state *state, int index);
 static int mstmm_complex_at_tangent_answered(mstmm_complex_state *state, int index);
-/* Unknowns of a body eliminated, of what it brings. */
+/* Unknowns of a body eliminated from its contribution. */
 static int mstmm_complex_at_tangent_eliminated(mstmm_complex_state *state, int index)
 {
     mstmm_complex S_c[54];
@@ -20563,7 +20563,7 @@ static int mstmm_complex_at_tangent_carried(mstmm_complex_state *state, int inde
     return 0;
 }
 
-/* Unknowns that answer a right-hand side. */
+/* Solution for a right-hand side. */
 static int mstmm_complex_at_tangent_answered(mstmm_complex_state *state, int index)
 {
     mstmm_complex x[6];

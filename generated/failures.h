@@ -16,7 +16,7 @@
 #define MSTMM_FAILED_BOUNCE 12
 #define MSTMM_FAILED_COUPLING 13
 #define MSTMM_FAILED_FLAT 14
-/* What a kernel returns behind its last result if a determinant is negative (mstmm.ir.statements). */
+/* Return value of a kernel for a negative determinant, after its last result (mstmm.ir.statements). */
 #define MSTMM_NEGATIVE 2
 
 #endif

@@ -37,7 +37,7 @@ int mstmm_force_bearing3_wrench_slope(const real *restrict p, const real *restri
  * out F[3] (N) force on T at its point, inertial axes
  * out M[3] (N*m) moment on T, inertial axes
  * out V[1] (J) stored energy
- * out P[1] (W) power of what is not stored
+ * out P[1] (W) power of non-conservative forces
  */
 int mstmm_force_bearing3_wrench(const real *restrict p, const real *restrict t,
     const real *restrict effort, const real *restrict A_F, const real *restrict x_F,
@@ -665,7 +665,7 @@ static const mstmm_kernel mstmm_force_bearing3_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_force_bearing3_wrench_inputs,
         .outputs = mstmm_force_bearing3_wrench_outputs,
-        .ir_hash = "3502f89efcf3470f64303eeb626a18d6324dfd543f6de6f4471e090b81a4ef9c",
+        .ir_hash = "2d8eefebf7ffc8b192392276e26e4b8de14ddfe010019a31b4307244204561e6",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -687,7 +687,7 @@ const mstmm_element mstmm_force_bearing3 = {
     .abi = MSTMM_ABI,
     .kind = "force",
     .name = "bearing3",
-    .hash = "e686153ce1e85a6a06c6966354f20a3f163fa837c90bf966fa89ce5436c5e714",
+    .hash = "ff984e7e6a54a0b65171a16f233e724748bbe760189df40dd579f8e288c3ed32",
     .nq = 0,
     .nu = 0,
     .np = 21,

@@ -37,7 +37,7 @@ int mstmm_force_bearing6_wrench_slope(const real *restrict p, const real *restri
  * out F[3] (N) force on T at its point, inertial axes
  * out M[3] (N*m) moment on T, inertial axes
  * out V[1] (J) stored energy
- * out P[1] (W) power of what is not stored
+ * out P[1] (W) power of non-conservative forces
  */
 int mstmm_force_bearing6_wrench(const real *restrict p, const real *restrict t,
     const real *restrict effort, const real *restrict A_F, const real *restrict x_F,
@@ -3347,7 +3347,7 @@ static const mstmm_kernel mstmm_force_bearing6_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_force_bearing6_wrench_inputs,
         .outputs = mstmm_force_bearing6_wrench_outputs,
-        .ir_hash = "7bc0ea53cede42dd26c8eed968c19aaed266c0e2938cbe245bc8ea1a3331a04c",
+        .ir_hash = "d7b39bc4646610691b9d38b91756a46ee0db8ec4868206fb26fa74331f3ebc44",
         .n_guards = 1,
         .guards = mstmm_force_bearing6_wrench_guards,
     },
@@ -3369,7 +3369,7 @@ const mstmm_element mstmm_force_bearing6 = {
     .abi = MSTMM_ABI,
     .kind = "force",
     .name = "bearing6",
-    .hash = "2fc7e12c3734ecb6fe167eb026506c2c8cc6707de77a206570c2af0f0f3ef45c",
+    .hash = "749a7dc38fe4390f99099894f328231a762e9b3c102a7f4a8bb025208a94c6b6",
     .nq = 0,
     .nu = 0,
     .np = 78,

@@ -37,7 +37,7 @@ int mstmm_force_bushing6_wrench_slope(const real *restrict p, const real *restri
  * out F[3] (N) force on T at its point, inertial axes
  * out M[3] (N*m) moment on T, inertial axes
  * out V[1] (J) stored energy
- * out P[1] (W) power of what is not stored
+ * out P[1] (W) power of non-conservative forces
  */
 int mstmm_force_bushing6_wrench(const real *restrict p, const real *restrict t,
     const real *restrict effort, const real *restrict A_F, const real *restrict x_F,
@@ -2853,7 +2853,7 @@ static const mstmm_kernel mstmm_force_bushing6_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_force_bushing6_wrench_inputs,
         .outputs = mstmm_force_bushing6_wrench_outputs,
-        .ir_hash = "323c4a5cab8b545d9e8b933c117741b0f0f9dc636086acef9fba8e735751f62b",
+        .ir_hash = "0ba86d7c9fcaac084d412cbd3458564cae5fda5df8847b85f1c489313230a7b7",
         .n_guards = 1,
         .guards = mstmm_force_bushing6_wrench_guards,
     },
@@ -2875,7 +2875,7 @@ const mstmm_element mstmm_force_bushing6 = {
     .abi = MSTMM_ABI,
     .kind = "force",
     .name = "bushing6",
-    .hash = "387e43e890ea18445f8d3659b939f77f696d66867f8d9829cf89a3637f680841",
+    .hash = "435a2c068d2d5c01cbb6593c213f326b98ded4f16661cd23eb98d095b3ffc799",
     .nq = 0,
     .nu = 0,
     .np = 48,

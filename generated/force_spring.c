@@ -37,7 +37,7 @@ int mstmm_force_spring_wrench_slope(const real *restrict p, const real *restrict
  * out F[3] (N) force on T at its point, inertial axes
  * out M[3] (N*m) moment on T, inertial axes
  * out V[1] (J) stored energy
- * out P[1] (W) power of what is not stored
+ * out P[1] (W) power of non-conservative forces
  */
 int mstmm_force_spring_wrench(const real *restrict p, const real *restrict t,
     const real *restrict effort, const real *restrict A_F, const real *restrict x_F,
@@ -619,7 +619,7 @@ static const mstmm_kernel mstmm_force_spring_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_force_spring_wrench_inputs,
         .outputs = mstmm_force_spring_wrench_outputs,
-        .ir_hash = "1026c3dd5a364a96ba12ae455ebb6f04e75bbaef9c70e386ae781a6f82c32ee6",
+        .ir_hash = "70b325b45d2a2f19528d26b81589ed756ed0db087bb873e9a3fb9a870f35b7f6",
         .n_guards = 1,
         .guards = mstmm_force_spring_wrench_guards,
     },
@@ -641,7 +641,7 @@ const mstmm_element mstmm_force_spring = {
     .abi = MSTMM_ABI,
     .kind = "force",
     .name = "spring",
-    .hash = "79eb96ffac206ede5287b34f4047ad51e7a95aeb443f77663c4026593aeef381",
+    .hash = "9d9d912efd76eaf5606ed7414c3827a31729d38b3cc7887887e37a4a001342e9",
     .nq = 0,
     .nu = 0,
     .np = 3,

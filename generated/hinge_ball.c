@@ -193,7 +193,7 @@ static const mstmm_port mstmm_hinge_ball_hinge_outputs[] = {
     {"qdot", 4, "", 0, 0},
 };
 
-/* bias motion behind the ball hinge
+/* bias motion outboard of the ball hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rt[3][3] rotation, inboard hinge axes to parent axes
@@ -1427,7 +1427,7 @@ static const mstmm_port mstmm_hinge_ball_rates_by_speeds_outputs[] = {
     {"J", 12, "", 0, 0},
 };
 
-/* motion across the hinge and of the body behind it
+/* motion across the hinge and of its outboard body
  * source: Rui, Wang, Zhang, ch. 5, (5.39)-(5.43)
  * in  p[0] parameters
  * in  q[4] coordinates: w, x, y, z
@@ -2424,7 +2424,7 @@ static const mstmm_kernel mstmm_hinge_ball_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_hinge_ball_forward_inputs,
         .outputs = mstmm_hinge_ball_forward_outputs,
-        .ir_hash = "8b0839732827394b84cf468f319b92f39a10fb276bf41c328797043b684830a0",
+        .ir_hash = "561d0077aba63d2f458d22f386c8da84e89be94c5217f13082780af1b978a960",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -2496,7 +2496,7 @@ static const mstmm_kernel mstmm_hinge_ball_kernels[] = {
         .n_outputs = 10,
         .inputs = mstmm_hinge_ball_forward_kept_inputs,
         .outputs = mstmm_hinge_ball_forward_kept_outputs,
-        .ir_hash = "f5e6ff10f24a818bf7399181cf84167e2623e853a38cfa0a223aae5d63978017",
+        .ir_hash = "7ca24593849cab654ccda302a8f5b0447ad8e68a903835bf0bfc38c97a6dd3d0",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -2518,7 +2518,7 @@ const mstmm_element mstmm_hinge_ball = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "ball",
-    .hash = "a6885e58537d3cc184cef9ece0ee5923c99f6dceb5d72a937d19ff4effd84965",
+    .hash = "4a0ec17d95795bc7eb40c95be5db8df1a7e05b7a965d75f65e9942640e09fa6f",
     .nq = 4,
     .nu = 3,
     .np = 0,

@@ -125,7 +125,7 @@ static const mstmm_port mstmm_hinge_cylindrical_hinge_outputs[] = {
     {"qdot", 2, "", 0, 0},
 };
 
-/* bias motion behind the cylindrical hinge
+/* bias motion outboard of the cylindrical hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rt[3][3] rotation, inboard hinge axes to parent axes
@@ -1089,7 +1089,7 @@ static const mstmm_port mstmm_hinge_cylindrical_rates_by_speeds_outputs[] = {
     {"J", 4, "", 0, 0},
 };
 
-/* motion across the hinge and of the body behind it
+/* motion across the hinge and of its outboard body
  * in  p[0] parameters
  * in  q[2] coordinates: displacement [m], angle [rad]
  * in  u[2] speeds: displacement_rate [m/s], angle_rate [rad/s]
@@ -1526,7 +1526,7 @@ static const mstmm_kernel mstmm_hinge_cylindrical_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_hinge_cylindrical_forward_inputs,
         .outputs = mstmm_hinge_cylindrical_forward_outputs,
-        .ir_hash = "4069bcfb6ff8361a3b45756e6ca7b8a519f428da4f297f5d1b65294f81ab6666",
+        .ir_hash = "a1177f61aadf1da2ef9a51e9cf3edebc8d405ecfc4a4b9ea52bae9cdc1e69fec",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1598,7 +1598,7 @@ static const mstmm_kernel mstmm_hinge_cylindrical_kernels[] = {
         .n_outputs = 10,
         .inputs = mstmm_hinge_cylindrical_forward_kept_inputs,
         .outputs = mstmm_hinge_cylindrical_forward_kept_outputs,
-        .ir_hash = "3fa875e01fe8273a1940323c550949156d8e163b5bc018ae5c6f092024feed44",
+        .ir_hash = "3f006b5c58228922f72ef692d6a940b8ea8c627dd6a14d8a27df3e65a95f1ac3",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1620,7 +1620,7 @@ const mstmm_element mstmm_hinge_cylindrical = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "cylindrical",
-    .hash = "8e6cc39b98ec32b7f7932a4aa07ea95397e556743f2eaba3b1a47ba7cb29c337",
+    .hash = "8a4a63c17eabd9a5cc181ffc1c86da2f3264cbf2f514400f6c59af3e97ea0686",
     .nq = 2,
     .nu = 2,
     .np = 0,

@@ -102,7 +102,7 @@ static const mstmm_port mstmm_hinge_fixed_hinge_outputs[] = {
     {"qdot", 0, "", 0, 0},
 };
 
-/* bias motion behind the fixed hinge
+/* bias motion outboard of the fixed hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rt[3][3] rotation, inboard hinge axes to parent axes
@@ -900,7 +900,7 @@ static const mstmm_port mstmm_hinge_fixed_hinge_slope_outputs[] = {
     {"d_qdot", 0, "", 0, 0},
 };
 
-/* motion across the hinge and of the body behind it
+/* motion across the hinge and of its outboard body
  * in  p[0] parameters
  * in  q[0] coordinates
  * in  u[0] speeds
@@ -1107,7 +1107,7 @@ static const mstmm_kernel mstmm_hinge_fixed_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_hinge_fixed_forward_inputs,
         .outputs = mstmm_hinge_fixed_forward_outputs,
-        .ir_hash = "a9dab8cce77658a1ed1558106b5136a876870ebf618d1c4e8c128c0fab2a6c68",
+        .ir_hash = "103b6fc436546417aaa4f193262f02afebf5b520136c5a113081f07fb3605661",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1155,7 +1155,7 @@ static const mstmm_kernel mstmm_hinge_fixed_kernels[] = {
         .n_outputs = 10,
         .inputs = mstmm_hinge_fixed_forward_kept_inputs,
         .outputs = mstmm_hinge_fixed_forward_kept_outputs,
-        .ir_hash = "b05b9ffb21a5a61586889e96f09739a8224bc1f67e899ba90f94ec2149054219",
+        .ir_hash = "4505fb5e008869329c929c102b13baae8dfc0472bbf6495ddbc4b4c11233f790",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1165,7 +1165,7 @@ const mstmm_element mstmm_hinge_fixed = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "fixed",
-    .hash = "d785d97ebc4473b2013ff1280062c646fc11fd16d68a59f804c104f202de4adf",
+    .hash = "256e8758c80cdbefa6c9dabfd940aaf67166894880b32a3950eabbc77720eb06",
     .nq = 0,
     .nu = 0,
     .np = 0,

@@ -242,7 +242,7 @@ static const mstmm_port mstmm_hinge_free_hinge_outputs[] = {
     {"qdot", 7, "", 0, 0},
 };
 
-/* bias motion behind the free hinge
+/* bias motion outboard of the free hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rt[3][3] rotation, inboard hinge axes to parent axes
@@ -2213,7 +2213,7 @@ static const mstmm_port mstmm_hinge_free_rates_by_speeds_outputs[] = {
     {"J", 42, "", 0, 0},
 };
 
-/* motion across the hinge and of the body behind it
+/* motion across the hinge and of its outboard body
  * in  p[0] parameters
  * in  q[7] coordinates: x [m], y [m], z [m], qw, qx, qy, qz
  * in  u[6] speeds: vx [m/s], vy [m/s], vz [m/s], wx [rad/s], wy [rad/s], wz [rad/s]
@@ -4340,7 +4340,7 @@ static const mstmm_kernel mstmm_hinge_free_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_hinge_free_forward_inputs,
         .outputs = mstmm_hinge_free_forward_outputs,
-        .ir_hash = "20aba27192a8edd4ce82f03919aba9c249a9ee2379bb722787a35394d2dcafc2",
+        .ir_hash = "09e8103e7f70b320021284642fa5de7d8844158550fb96bb088f412664a9f4ea",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4412,7 +4412,7 @@ static const mstmm_kernel mstmm_hinge_free_kernels[] = {
         .n_outputs = 10,
         .inputs = mstmm_hinge_free_forward_kept_inputs,
         .outputs = mstmm_hinge_free_forward_kept_outputs,
-        .ir_hash = "64713e8417c451dd353cf0d44ea60de41430e2d190d1c63038b92dac584b66d8",
+        .ir_hash = "25394ea5a43dbd45a501d1d7d021efb7ee3f5cc1b0188d1fdf0ba47a2c19c04f",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4434,7 +4434,7 @@ const mstmm_element mstmm_hinge_free = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "free",
-    .hash = "3c8b1dd7d5efcfeda94dcf4621dd10a90855f2cd2fb39eb5034b0d1864eb1825",
+    .hash = "18356146f3b5c5ac06f6f9ae3e1b1e426da1bcb248cd44786f030b3732b202dd",
     .nq = 7,
     .nu = 6,
     .np = 0,

@@ -178,7 +178,7 @@ static const mstmm_port mstmm_hinge_gimbal_hinge_outputs[] = {
     {"qdot", 3, "", 0, 0},
 };
 
-/* bias motion behind the gimbal hinge (three angles)
+/* bias motion outboard of the gimbal hinge (three angles)
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rt[3][3] rotation, inboard hinge axes to parent axes
@@ -1698,7 +1698,7 @@ static const mstmm_port mstmm_hinge_gimbal_rates_by_speeds_outputs[] = {
     {"J", 9, "", 0, 0},
 };
 
-/* motion across the hinge and of the body behind it
+/* motion across the hinge and of its outboard body
  * in  p[0] parameters
  * in  q[3] coordinates: angle1 [rad], angle2 [rad], angle3 [rad]
  * in  u[3] speeds: angle1_rate [rad/s], angle2_rate [rad/s], angle3_rate [rad/s]
@@ -2535,7 +2535,7 @@ static const mstmm_kernel mstmm_hinge_gimbal_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_hinge_gimbal_forward_inputs,
         .outputs = mstmm_hinge_gimbal_forward_outputs,
-        .ir_hash = "cd7d095e77fed8efccbdd8756d235066015a4dcee0630f26a9f099b7129fa61d",
+        .ir_hash = "b362fe0a251548752a6c5cb0d0a5fb845b854f1638aac60aa311a1c0b4a4ab2a",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -2619,7 +2619,7 @@ static const mstmm_kernel mstmm_hinge_gimbal_kernels[] = {
         .n_outputs = 10,
         .inputs = mstmm_hinge_gimbal_forward_kept_inputs,
         .outputs = mstmm_hinge_gimbal_forward_kept_outputs,
-        .ir_hash = "3a191a2279896595b2f747d52358a19bb79c16904faae5b5f8f27846337cdbdc",
+        .ir_hash = "936f7abf79f2a4d1ba8372395a1ab9998963d22df850ad4606b76f4e8d88b5cf",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -2641,7 +2641,7 @@ const mstmm_element mstmm_hinge_gimbal = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "gimbal",
-    .hash = "d750cda9dbf25d65be4d506f3a45a96ccef2d45d5912c4788d9e8038db1d3878",
+    .hash = "757f50ca7e34f42b6aeec70262581bd1f28c3445356ff8e995dad4a2fef28f03",
     .nq = 3,
     .nu = 3,
     .np = 0,

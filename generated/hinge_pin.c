@@ -120,7 +120,7 @@ static const mstmm_port mstmm_hinge_pin_hinge_outputs[] = {
     {"qdot", 1, "", 0, 0},
 };
 
-/* bias motion behind the pin hinge
+/* bias motion outboard of the pin hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rt[3][3] rotation, inboard hinge axes to parent axes
@@ -1023,7 +1023,7 @@ static const mstmm_port mstmm_hinge_pin_rates_by_speeds_outputs[] = {
     {"J", 1, "", 0, 0},
 };
 
-/* motion across the hinge and of the body behind it
+/* motion across the hinge and of its outboard body
  * source: Rui, Wang, Zhang, ch. 5, (5.50)-(5.54)
  * in  p[0] parameters
  * in  q[1] coordinates: angle [rad]
@@ -1389,7 +1389,7 @@ static const mstmm_kernel mstmm_hinge_pin_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_hinge_pin_forward_inputs,
         .outputs = mstmm_hinge_pin_forward_outputs,
-        .ir_hash = "a670a29652ee1cb4d567aaa204b75e1cba574962bb89390557abe6703276dd4d",
+        .ir_hash = "ad59a8a02758225b89441b6a60f335634183445bcbdc4fe8c92ca383d101f6fa",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1461,7 +1461,7 @@ static const mstmm_kernel mstmm_hinge_pin_kernels[] = {
         .n_outputs = 10,
         .inputs = mstmm_hinge_pin_forward_kept_inputs,
         .outputs = mstmm_hinge_pin_forward_kept_outputs,
-        .ir_hash = "3796999246932f04733a6ee8e98b1d53827d905a0a8c3923cf2324e48f21daa2",
+        .ir_hash = "95fc4b77eb37245abda486faca2987a1db8eb31dc679e8fcf8a97d9eda453e1d",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1483,7 +1483,7 @@ const mstmm_element mstmm_hinge_pin = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "pin",
-    .hash = "6ca18e194840cbf963bcbb33dc23cbe1158dadbe443177a63724091b523f19ef",
+    .hash = "987bb9b2370bef33965ea37f8e8d1f38e548bee7aba1651390c58950ad39b8db",
     .nq = 1,
     .nu = 1,
     .np = 0,

@@ -138,7 +138,7 @@ static const mstmm_port mstmm_hinge_planar_hinge_outputs[] = {
     {"qdot", 3, "", 0, 0},
 };
 
-/* bias motion behind the planar hinge
+/* bias motion outboard of the planar hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rt[3][3] rotation, inboard hinge axes to parent axes
@@ -1432,7 +1432,7 @@ static const mstmm_port mstmm_hinge_planar_rates_by_speeds_outputs[] = {
     {"J", 9, "", 0, 0},
 };
 
-/* motion across the hinge and of the body behind it
+/* motion across the hinge and of its outboard body
  * in  p[0] parameters
  * in  q[3] coordinates: x [m], y [m], angle [rad]
  * in  u[3] speeds: x_rate [m/s], y_rate [m/s], angle_rate [rad/s]
@@ -2042,7 +2042,7 @@ static const mstmm_kernel mstmm_hinge_planar_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_hinge_planar_forward_inputs,
         .outputs = mstmm_hinge_planar_forward_outputs,
-        .ir_hash = "1de9e0be6926c823ef9c2dfdafbac93e05591f0c264dfcb87d34405c82397d42",
+        .ir_hash = "d08bb20372d6560a2d64020079ac80f566aae6806fb705dc8af89e2e65bd7eab",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -2114,7 +2114,7 @@ static const mstmm_kernel mstmm_hinge_planar_kernels[] = {
         .n_outputs = 10,
         .inputs = mstmm_hinge_planar_forward_kept_inputs,
         .outputs = mstmm_hinge_planar_forward_kept_outputs,
-        .ir_hash = "44876a871c7c0b84082330e3a002b5d2a64d1dd1d737a0fb749ca6522e8d766e",
+        .ir_hash = "f7a34e213a32fcce967f794f066d186a6d9fa06a895e8e761ea4ac798f220c83",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -2136,7 +2136,7 @@ const mstmm_element mstmm_hinge_planar = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "planar",
-    .hash = "8b0fc168410893be3c4efd3f79a21023ccf450d18a4b682fbacc4b2933232c6e",
+    .hash = "0af5e2752fa2d63be7d5f6615f6533c03857b313ff7fe67cdd2c771b0ebbc11c",
     .nq = 3,
     .nu = 3,
     .np = 0,

@@ -115,7 +115,7 @@ static const mstmm_port mstmm_hinge_prismatic_hinge_outputs[] = {
     {"qdot", 1, "", 0, 0},
 };
 
-/* bias motion behind the prismatic hinge
+/* bias motion outboard of the prismatic hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rt[3][3] rotation, inboard hinge axes to parent axes
@@ -1012,7 +1012,7 @@ static const mstmm_port mstmm_hinge_prismatic_rates_by_speeds_outputs[] = {
     {"J", 1, "", 0, 0},
 };
 
-/* motion across the hinge and of the body behind it
+/* motion across the hinge and of its outboard body
  * in  p[0] parameters
  * in  q[1] coordinates: displacement [m]
  * in  u[1] speeds: displacement_rate [m/s]
@@ -1358,7 +1358,7 @@ static const mstmm_kernel mstmm_hinge_prismatic_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_hinge_prismatic_forward_inputs,
         .outputs = mstmm_hinge_prismatic_forward_outputs,
-        .ir_hash = "fd90efa4f6c3f610bd4de7c7c9d8bfa3cc04511b0d5115d680a49d21a8565471",
+        .ir_hash = "13c39559fe315f5fa4cfd63c25aadd4b7cad20bde08c60bf538716bef396ad65",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1430,7 +1430,7 @@ static const mstmm_kernel mstmm_hinge_prismatic_kernels[] = {
         .n_outputs = 10,
         .inputs = mstmm_hinge_prismatic_forward_kept_inputs,
         .outputs = mstmm_hinge_prismatic_forward_kept_outputs,
-        .ir_hash = "ba1b9fe3072148c8dd61ab1d3effc797f39f3d5788c253217931b0d290ee376b",
+        .ir_hash = "74f6cc26b84d37f5d20cdfeabd0810923716c05cfad9561f03c9733915f50d27",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1452,7 +1452,7 @@ const mstmm_element mstmm_hinge_prismatic = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "prismatic",
-    .hash = "8f66b54e377f3e28af4405a26bb57d5eed20cfcd19a93741a65927c03b98b84b",
+    .hash = "090795aa69b6bb57c0764918d46bf35c9daeb2f3a494cb9900ac1e26d02ae25d",
     .nq = 1,
     .nu = 1,
     .np = 0,

@@ -124,7 +124,7 @@ static const mstmm_port mstmm_hinge_screw_hinge_outputs[] = {
     {"qdot", 1, "", 0, 0},
 };
 
-/* bias motion behind the screw hinge
+/* bias motion outboard of the screw hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rt[3][3] rotation, inboard hinge axes to parent axes
@@ -1169,7 +1169,7 @@ static const mstmm_port mstmm_hinge_screw_rates_by_speeds_outputs[] = {
     {"J", 1, "", 0, 0},
 };
 
-/* motion across the hinge and of the body behind it
+/* motion across the hinge and of its outboard body
  * in  p[1] parameters: lead [m]
  * in  q[1] coordinates: angle [rad]
  * in  u[1] speeds: angle_rate [rad/s]
@@ -1605,7 +1605,7 @@ static const mstmm_kernel mstmm_hinge_screw_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_hinge_screw_forward_inputs,
         .outputs = mstmm_hinge_screw_forward_outputs,
-        .ir_hash = "8f0911f4936a0a4f7803608c664f9c73e33f309aeebd09a0ace15b3156fc2619",
+        .ir_hash = "79bff12dcc1e43e1326590288e252f776b7a74e55769275d7fe525c6c4cf75bf",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1677,7 +1677,7 @@ static const mstmm_kernel mstmm_hinge_screw_kernels[] = {
         .n_outputs = 10,
         .inputs = mstmm_hinge_screw_forward_kept_inputs,
         .outputs = mstmm_hinge_screw_forward_kept_outputs,
-        .ir_hash = "b70e1c0383e49a5a385f3dc6a79388745811d4ee7f042fcd17e9fe8046709ac3",
+        .ir_hash = "ba354826e804cb40bddfc6218e3c57d0f57a7d3041b24bf46cd5c35624deeb5e",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1699,7 +1699,7 @@ const mstmm_element mstmm_hinge_screw = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "screw",
-    .hash = "633348380add35c0faa2959623b9f9ddfbb6face89d1dd4af15ec0e662c3883c",
+    .hash = "7ac692811f30e1fc3f98ef155a0d75a05e63783cb96ba3e52afaf0659a5c7a7c",
     .nq = 1,
     .nu = 1,
     .np = 1,

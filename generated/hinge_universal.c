@@ -155,7 +155,7 @@ static const mstmm_port mstmm_hinge_universal_hinge_outputs[] = {
     {"qdot", 2, "", 0, 0},
 };
 
-/* bias motion behind the universal hinge
+/* bias motion outboard of the universal hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rt[3][3] rotation, inboard hinge axes to parent axes
@@ -1372,7 +1372,7 @@ static const mstmm_port mstmm_hinge_universal_rates_by_speeds_outputs[] = {
     {"J", 4, "", 0, 0},
 };
 
-/* motion across the hinge and of the body behind it
+/* motion across the hinge and of its outboard body
  * in  p[1] parameters: alpha [rad]
  * in  q[2] coordinates: angle1 [rad], angle2 [rad]
  * in  u[2] speeds: angle1_rate [rad/s], angle2_rate [rad/s]
@@ -2006,7 +2006,7 @@ static const mstmm_kernel mstmm_hinge_universal_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_hinge_universal_forward_inputs,
         .outputs = mstmm_hinge_universal_forward_outputs,
-        .ir_hash = "83041adfabc42d0636cb116249179eb761419b116273417157dbfa39eeecfe92",
+        .ir_hash = "e759c0fdb8f85aade5a4a475ec8a60ad024c4e055dafce335ab2e8dc024c6030",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -2078,7 +2078,7 @@ static const mstmm_kernel mstmm_hinge_universal_kernels[] = {
         .n_outputs = 10,
         .inputs = mstmm_hinge_universal_forward_kept_inputs,
         .outputs = mstmm_hinge_universal_forward_kept_outputs,
-        .ir_hash = "6016724b5256b65736f4b5597e4df84fa2ec50b625b140ceb0286d79d6d61278",
+        .ir_hash = "3e93f44ab48b3343170dae915351027e66842c2839eb5f11b100d885db1acab7",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -2100,7 +2100,7 @@ const mstmm_element mstmm_hinge_universal = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "universal",
-    .hash = "554904d6e761a21c85ec8e90969f9e6dd965ba5797a9c66b6676a259baa51c06",
+    .hash = "8cd5b2332d879436c91ce8bca8405472770ba1d61a5befc2337e13671212ed67",
     .nq = 2,
     .nu = 2,
     .np = 1,

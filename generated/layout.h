@@ -29,7 +29,7 @@
 #define MSTMM_SPEED_GAIN 10
 #define MSTMM_SPEED_H_FREE 16
 #define MSTMM_BLOCK_PER_SPEED 22
-/* Flexible bodies and sections: arrays behind so many numbers per mode. */
+/* Flexible bodies and sections: arrays after a number of values per mode. */
 #define MSTMM_MODES_S_RF_PER_MODE 0
 #define MSTMM_MODES_BASED_PER_MODE 6
 #define MSTMM_MODES_A_PER_MODE 12
@@ -41,7 +41,7 @@
 #define MSTMM_SECTION_H_PER_MODE 6
 #define MSTMM_SECTION_PUSH_PER_MODE 12
 #define MSTMM_SECTION_H6_PER_MODE 18
-/* A hinge that closes a loop; a coupling; a row. */
+/* A cut hinge; a coupling; a row. */
 #define MSTMM_CLOSURE_W 0
 #define MSTMM_CLOSURE_J_A 36
 #define MSTMM_CLOSURE_J_B 72
@@ -64,7 +64,7 @@
 #define MSTMM_ROW_X 9
 #define MSTMM_ROW_TOLD 10
 #define MSTMM_ROW 11
-/* A body in a plane, and what its record gives. */
+/* A body in a plane, and the values of its record. */
 #define MSTMM_FLAT_A 0
 #define MSTMM_FLAT_X 2
 #define MSTMM_FLAT_V 5
@@ -107,7 +107,7 @@
 #define MSTMM_SECTION_PSID(n) (18 * (size_t)(n) + 45)
 #define MSTMM_SECTION_XDD(n) (18 * (size_t)(n) + 48)
 #define MSTMM_SECTION_PSIDD(n) (18 * (size_t)(n) + 51)
-/* What the tangent keeps of a body, of a flexible one, of a section. */
+/* Data of the tangent for a body, a flexible body, a section. */
 #define MSTMM_TANGENT_S(nu, nq) (0)
 #define MSTMM_TANGENT_B(nu, nq) (54 * 1)
 #define MSTMM_TANGENT_G(nu, nq) (54 * 1 + 9 * (nu))

@@ -5,7 +5,7 @@
 #include "kernel_calls.h"
 #include "links.h"
 
-/* Rotation across the hinge; about z its angle, whose sine and cosine are taken for two links at a time. */
+/* Rotation across the hinge; about z only its angle, because sines and cosines of two links are computed together. */
 static inline int mstmm_at_link_turn(mstmm_link_at at)
 {
     mstmm_link_turn(at.turn,
@@ -26,7 +26,7 @@ static inline int mstmm_at_link_forward(mstmm_link_at at)
     return 0;
 }
 
-/* S and e of what hangs on a link, and of the link itself, carried on. */
+/* S and e of a link and its outboard part, carried to the parent. */
 static inline int mstmm_at_link_condense(mstmm_link_at at)
 {
     int code;
@@ -40,7 +40,7 @@ static inline int mstmm_at_link_condense(mstmm_link_at at)
     return 0;
 }
 
-/* Acceleration of a link, and its deviation in place of its motion. */
+/* Acceleration of a link, and its deviation, which replaces its motion. */
 static inline int mstmm_at_link_recover(mstmm_link_at at)
 {
     mstmm_link_recover(at.recover,

@@ -117,7 +117,7 @@ int mstmm_sweep_frames_length_slope(const real *restrict x_F, const real *restri
 
 #ifndef MSTMM_TWO
 #define MSTMM_TWO
-/* Two numbers at a time, in a register and in an array. */
+/* Pairs of numbers, in a register and in an array. */
 typedef real two_t __attribute__((vector_size(2 * sizeof(real))));
 typedef real two_free_t __attribute__((vector_size(2 * sizeof(real)), aligned(sizeof(real)), may_alias));
 
@@ -463,7 +463,7 @@ static const mstmm_port mstmm_sweep_frames_point_outputs[] = {
     {"a_K", 3, "m/s2", 0, 0},
 };
 
-/* turning of a body
+/* rotation of a body
  * in  A[3][3] rotation, body axes to inertial axes
  * in  motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  * in  delta[6] deviation of the body's acceleration
@@ -1533,12 +1533,12 @@ static const mstmm_port mstmm_sweep_frames_rotor_energy_outputs[] = {
     {"T", 1, "J", 0, 0},
 };
 
-/* effort that a prescribed acceleration needs
+/* effort required by a prescribed acceleration
  * in  felt[1] (N, N*m) effort along the speed of the load at P, H^T f
  * in  J[1] (kg or kg*m2) rotor inertia reflected to the speed
  * in  udot[1] acceleration
- * in  tau[1] (N, N*m) effort that is there already
- * out tau_d[1] (N, N*m) what is missing
+ * in  tau[1] (N, N*m) effort already applied
+ * out tau_d[1] (N, N*m) missing effort
  */
 int mstmm_sweep_frames_driven_effort(const real *restrict felt, const real *restrict J,
     const real *restrict udot, const real *restrict tau, real *restrict tau_d)
@@ -2007,8 +2007,8 @@ static const mstmm_port mstmm_sweep_frames_state_deviation_outputs[] = {
  * in  w_I[3] (rad/s) angular velocity of the parent, parent axes
  * in  v[3] (m/s) relative velocity of the hinge, body axes
  * in  w[3] (rad/s) relative angular velocity of the hinge, body axes
- * in  S[9][6] change of the load by that of the motion, a row an entry
- * out T[9][6] S Th, a row an entry
+ * in  S[9][6] change of the load by that of the motion, one row per entry
+ * out T[9][6] S Th, one row per entry
  * out S_I[9][6] that of the parent, added to what is there
  */
 int mstmm_sweep_frames_tangent_carry(const real *restrict Rc, const real *restrict r,
@@ -2430,14 +2430,14 @@ static const mstmm_port mstmm_sweep_frames_tangent_moved_outputs[] = {
     {"z", 9, "", 0, 0},
 };
 
-/* turn and change of place along a direction
+/* rotation and displacement along a direction
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  R[3][3]
  * in  d_R[3][3]
  * in  d_d[3]
- * out theta[3] turn of the body along the direction, body axes
- * out x[3] change of place of P along the direction, body axes
+ * out theta[3] rotation of the body along the direction, body axes
+ * out x[3] displacement of P along the direction, body axes
  */
 int mstmm_sweep_frames_tangent_turned(const real *restrict R, const real *restrict d_R,
     const real *restrict d_d, real *restrict theta, real *restrict x)
@@ -2498,14 +2498,14 @@ static const mstmm_port mstmm_sweep_frames_tangent_turned_outputs[] = {
     {"x", 3, "", 0, 0},
 };
 
-/* load by a motion that is known
+/* load due to a known motion
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  S[9][6] change of the load by that of the motion, a row an entry
- * in  b[9] change of motion that is known
- * in  g[6] (N, N*m) change of the carried load by what is known
- * out e_S[6] (N, N*m) load by the motion that is known
- * out e_b[6] (N, N*m) load by what is known, without the unknowns
+ * in  S[9][6] change of the load by that of the motion, one row per entry
+ * in  b[9] known change of motion
+ * in  g[6] (N, N*m) change of the carried load due to known increments
+ * out e_S[6] (N, N*m) load due to the known motion
+ * out e_b[6] (N, N*m) load due to known increments, without the unknowns
  */
 int mstmm_sweep_frames_tangent_known(const real *restrict S, const real *restrict b,
     const real *restrict g, real *restrict e_S, real *restrict e_b)
@@ -2565,14 +2565,14 @@ static const mstmm_port mstmm_sweep_frames_tangent_known_outputs[] = {
     {"e_b", 6, "N, N*m", 0, 0},
 };
 
-/* change of a body's place by the motion of its parent
+/* change of a body's pose by the motion of its parent
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  z_I[9] change of the parent's motion, parent axes
- * in  p_I[9] change of the parent's place, parent axes
- * out p[9] change of place: turn, place and velocity of P, own axes
+ * in  p_I[9] change of the parent's pose, parent axes
+ * out p[9] change of pose: rotation, position and velocity of P, own axes
  */
 int mstmm_sweep_frames_placed_moved(const real *restrict Rc, const real *restrict r,
     const real *restrict z_I, const real *restrict p_I, real *restrict p)
@@ -2675,13 +2675,13 @@ static const mstmm_port mstmm_sweep_frames_placed_moved_outputs[] = {
     {"p", 9, "", 0, 0},
 };
 
-/* pose and velocity by a change of place
+/* pose and velocity by a change of pose
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  A[3][3] axes, body to inertial
- * in  p[9] change of place: turn, place and velocity of P, own axes
+ * in  p[9] change of pose: rotation, position and velocity of P, own axes
  * out d_A[3][3] their change
- * out d_x[3] (m) change of place of P, inertial axes
+ * out d_x[3] (m) displacement of P, inertial axes
  * out d_v[3] (m/s) change of velocity of P, own axes
  */
 int mstmm_sweep_frames_placed_pose(const real *restrict A, const real *restrict p,
@@ -2764,16 +2764,16 @@ static const mstmm_port mstmm_sweep_frames_placed_pose_outputs[] = {
     {"d_v", 3, "m/s", 0, 0},
 };
 
-/* change of place along a direction
+/* change of pose along a direction
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  theta[3] turn of the body along the direction, body axes
- * in  x[3] change of place of P along the direction, body axes
+ * in  theta[3] rotation of the body along the direction, body axes
+ * in  x[3] displacement of P along the direction, body axes
  * in  v_P[3] (m/s) velocity of P, own axes
  * in  v[3] (m/s) relative velocity of the hinge, body axes
  * in  d_v[3] (m/s) change of the relative velocity
  * in  Q[9] motion of Q in body axes: w first
- * out B_p[9] change of place along the direction
+ * out B_p[9] change of pose along the direction
  */
 int mstmm_sweep_frames_placed_column(const real *restrict theta, const real *restrict x,
     const real *restrict v_P, const real *restrict v, const real *restrict d_v,
@@ -2837,13 +2837,13 @@ static const mstmm_port mstmm_sweep_frames_placed_column_outputs[] = {
     {"B_p", 9, "", 0, 0},
 };
 
-/* change of a load by place carried to the parent
+/* change of a load by the pose, carried to the parent
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
- * in  S_p[9][6] change of the load by the place, a row an entry
- * out T_p[9][6] S_p Th_p, a row an entry
+ * in  S_p[9][6] change of the load by the pose, one row per entry
+ * out T_p[9][6] S_p Th_p, one row per entry
  * out T_w[3][6] S_p Th_z by angular velocity, added to what is there
  * out S_pI[9][6] that of the parent, added to what is there
  * out S_wI[3][6] the parent's S, of it that, added to what is there
@@ -3918,12 +3918,12 @@ static const mstmm_port mstmm_sweep_frames_placed_carry_outputs[] = {
     {"S_wI", 18, "", 1, 0},
 };
 
-/* load by a change of place that is known
+/* load due to a known change of pose
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  S_p[9][6] change of the load by the place, a row an entry
- * in  b_p[9] change of place that is known
- * out e_S[6] (N, N*m) load by what is known, added to what is there
+ * in  S_p[9][6] change of the load by the pose, one row per entry
+ * in  b_p[9] known change of pose
+ * out e_S[6] (N, N*m) load due to known increments, added to what is there
  * out e_b[6] (N, N*m) the same, as it is carried, added to what is there
  */
 int mstmm_sweep_frames_placed_known(const real *restrict S_p, const real *restrict b_p,
@@ -5164,7 +5164,7 @@ static const mstmm_port mstmm_sweep_frames_transport_slope_outputs[] = {
  * in  felt[1] (N, N*m) effort along the speed of the load at P, H^T f
  * in  J[1] (kg or kg*m2) rotor inertia reflected to the speed
  * in  udot[1] acceleration
- * in  tau[1] (N, N*m) effort that is there already
+ * in  tau[1] (N, N*m) effort already applied
  * in  d_felt[1] (N, N*m) derivative of felt
  * in  d_udot[1] derivative of udot
  * in  d_tau[1] (N, N*m) derivative of tau
@@ -5341,7 +5341,7 @@ static const mstmm_kernel mstmm_sweep_frames_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_frames_turning_inputs,
         .outputs = mstmm_sweep_frames_turning_outputs,
-        .ir_hash = "8c0855435eb1a4c29a5e7347dbbad1bcecc1d6f8279a68369af0c339897aa695",
+        .ir_hash = "1dbee9027863da13753f8a77706451c1227545ce3b03bc0236c2d1f15af5a991",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5497,7 +5497,7 @@ static const mstmm_kernel mstmm_sweep_frames_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_frames_driven_effort_inputs,
         .outputs = mstmm_sweep_frames_driven_effort_outputs,
-        .ir_hash = "0daf641a3cce328a3f5da3576060f6b261dfcbc1f5fe9b10bf57679bbf6a2e6b",
+        .ir_hash = "0d600317b607c6628becca97d9373b507be6182b9c78322d260d4d6b82cddbb9",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5569,7 +5569,7 @@ static const mstmm_kernel mstmm_sweep_frames_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_frames_tangent_carry_inputs,
         .outputs = mstmm_sweep_frames_tangent_carry_outputs,
-        .ir_hash = "d718f0b4129945a85ce8a00e515bace270d9e0d277a38fe64a374d7ba65eff8f",
+        .ir_hash = "3c958215d8c9c499a65d06199c4afe860c2b09a5b4b5bb06bf1c8026ab76b208",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5593,7 +5593,7 @@ static const mstmm_kernel mstmm_sweep_frames_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_frames_tangent_turned_inputs,
         .outputs = mstmm_sweep_frames_tangent_turned_outputs,
-        .ir_hash = "56d92003cfb79c71f4c8fc829fe2c7323749f7e020e918457ea5ec958d9a3af5",
+        .ir_hash = "18e29affd54e083febe0792a094ea8cf90a5876a9d4c4832ced74d357a310dca",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5605,7 +5605,7 @@ static const mstmm_kernel mstmm_sweep_frames_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_frames_tangent_known_inputs,
         .outputs = mstmm_sweep_frames_tangent_known_outputs,
-        .ir_hash = "c19009117b80deaa95afd241255e9baa5398ce492aa633d53af87546c4278b6c",
+        .ir_hash = "e38fc718df6320daf70039382e7538593187fff779ab28b21f2d78bb5be46419",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5617,7 +5617,7 @@ static const mstmm_kernel mstmm_sweep_frames_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_frames_placed_moved_inputs,
         .outputs = mstmm_sweep_frames_placed_moved_outputs,
-        .ir_hash = "512a0da41198a594fbcac1f8aecebf015be9b36a4fe3cfca3554a0c248b89636",
+        .ir_hash = "225e361fb1d82b080246ea3adcaa6f819f3649a795c1b715ffda80d9b4b85472",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5629,7 +5629,7 @@ static const mstmm_kernel mstmm_sweep_frames_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_frames_placed_pose_inputs,
         .outputs = mstmm_sweep_frames_placed_pose_outputs,
-        .ir_hash = "4e185e11f9d90c87dd913ca2d7c31c7461388593f730a4e4c95ece3b75e52e51",
+        .ir_hash = "72680f60f5249d9951c3c2d9d1098b152b87f5323eb7d5c2db251b57e8b66061",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5641,7 +5641,7 @@ static const mstmm_kernel mstmm_sweep_frames_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_frames_placed_column_inputs,
         .outputs = mstmm_sweep_frames_placed_column_outputs,
-        .ir_hash = "915ce735c27e3ac5fcffdca36cc0239da40874d0817b489068802929ccdff583",
+        .ir_hash = "07f9fc918fcece10909d2160199d2e74884ddf18d00e9f6a6a6278a39ae2a205",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5653,7 +5653,7 @@ static const mstmm_kernel mstmm_sweep_frames_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_sweep_frames_placed_carry_inputs,
         .outputs = mstmm_sweep_frames_placed_carry_outputs,
-        .ir_hash = "96d0ae62e08ef57e85cc46721bccc841200d0a18198ac416ba22e243e0fcd1bb",
+        .ir_hash = "83c70cd585cb5fbf4b7d1eb64596b372e4b96be403fe823cf98df6831b5ac7b4",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5665,7 +5665,7 @@ static const mstmm_kernel mstmm_sweep_frames_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_frames_placed_known_inputs,
         .outputs = mstmm_sweep_frames_placed_known_outputs,
-        .ir_hash = "f8a617ab9500541c3c310b5dd0efbca69fffb61c3fcb4014721c35474469f139",
+        .ir_hash = "4255bcec45dd9ba73fe8052e01523398113f68ad7d21fff5143067bbdef11234",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5773,7 +5773,7 @@ static const mstmm_kernel mstmm_sweep_frames_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_frames_driven_effort_slope_inputs,
         .outputs = mstmm_sweep_frames_driven_effort_slope_outputs,
-        .ir_hash = "edad07f26b8a0ea36c3e25cd1a5b75e26d3a69bc3a350dc775ee5a38723206ef",
+        .ir_hash = "4515c48a8644431691d0834611b9919931e0381205ddbfa53a5e26b69ff12fa5",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5795,7 +5795,7 @@ const mstmm_element mstmm_sweep_frames = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "frames",
-    .hash = "a56341e14780d8bddb7d1c508dbc6df37290d4abf92bae0bf56355904f5dae48",
+    .hash = "965435ae8ce7baca18e1801c7e97205917065638eb2f1b00f1fadc4d99ed461a",
     .nq = 0,
     .nu = 0,
     .np = 0,

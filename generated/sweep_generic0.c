@@ -61,7 +61,7 @@ int mstmm_sweep_generic0_effort_slope(const real *restrict H, const real *restri
 int mstmm_sweep_generic0_complement_slope(const real *restrict H, const real *restrict d_H,
     real *restrict d_W);
 
-/* bias motion behind a hinge with 0 speeds
+/* bias motion outboard of a hinge with 0 speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rt[3][3] rotation, inboard hinge axes to parent axes
@@ -956,7 +956,7 @@ static const mstmm_port mstmm_sweep_generic0_project_outputs[] = {
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][0] motion subspace of the free coordinates
  * in  J[0] (kg*m2 or kg) rotor inertia reflected to the speeds
- * in  W[0][0] change of the efforts of laws, a row a speed
+ * in  W[0][0] change of the efforts of laws, one row per speed
  * in  floor[2] (kg, kg*m2) least inertia along and about an axis that is not rounding
  * in  S[21] f = S a + e of everything outboard, at P
  * out F[0][0] D = L diag(d) L^T: L, and 1 / d on the diagonal
@@ -1341,7 +1341,7 @@ static const mstmm_port mstmm_sweep_generic0_factor_outputs[] = {
     {"S_I", 21, "", 1, 0},
 };
 
-/* load of a column carried across a hinge with no free speeds
+/* load of a right-hand side carried across a hinge with no free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -1349,7 +1349,7 @@ static const mstmm_port mstmm_sweep_generic0_factor_outputs[] = {
  * in  H[6][0] motion subspace of the free coordinates
  * in  G[0][6] D^-1 H^T S
  * in  e[6] (N, N*m) force part of f = S a + e, at P
- * in  tau[0] (N, N*m) the column's efforts on the free coordinates
+ * in  tau[0] (N, N*m) efforts of the right-hand side on the free coordinates
  * out y[0] (N, N*m) tau - H^T e
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
@@ -1465,7 +1465,7 @@ static const mstmm_port mstmm_sweep_generic0_push_outputs[] = {
     {"e_I", 6, "N, N*m", 1, 0},
 };
 
-/* accelerations that answer a column, across a hinge with no free speeds
+/* accelerations due to a right-hand side, across a hinge with no free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -1559,7 +1559,7 @@ static const mstmm_port mstmm_sweep_generic0_answer_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
-/* rows behind a hinge with no free speeds
+/* rows outboard of a hinge with no free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * source: Gauss, J. reine angew. Math. 4 (1829) 232-235 (least constraint)
@@ -1568,14 +1568,14 @@ static const mstmm_port mstmm_sweep_generic0_answer_outputs[] = {
  * in  J[0] (kg*m2 or kg) rotor inertia reflected to the speeds
  * in  floor[2] (kg, kg*m2) least inertia along and about an axis that is not rounding
  * in  U[21] upper triangle, row by row: S = U^T U
- * in  d[6] load that rows take: f = U^T (U a + d) + e
+ * in  d[6] load in the rows: f = U^T (U a + d) + e
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  tau[0] (N, N*m) efforts on the free coordinates
  * out G[0][6] udot = g - G a_Q
  * out g[0] udot = g - G a_Q
- * out V[21] upper triangle of what is behind the hinge
- * out d_V[6] load that its rows take
- * out e_Q[6] (N, N*m) load that they do not take
+ * out V[21] upper triangle outboard of the hinge
+ * out d_V[6] load in its rows
+ * out e_Q[6] (N, N*m) load outside the rows
  */
 int mstmm_sweep_generic0_qr_eliminate(const real *restrict H, const real *restrict J,
     const real *restrict floor_, const real *restrict U, const real *restrict d,
@@ -1885,14 +1885,14 @@ static const mstmm_port mstmm_sweep_generic0_tangent_carrier_outputs[] = {
 /* a direction of a hinge with 0 speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  theta[3] turn of the body along the direction, body axes
- * in  x[3] change of place of P along the direction, body axes
+ * in  theta[3] rotation of the body along the direction, body axes
+ * in  x[3] displacement of P along the direction, body axes
  * in  H[6][0]
  * in  s[0]
  * in  v[3]
  * in  w[3]
  * in  Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
- * in  f[6] (N, N*m) load at P that is carried
+ * in  f[6] (N, N*m) carried load at P
  * in  d_H[6][0]
  * in  d_v[3]
  * in  d_w[3]
@@ -1901,7 +1901,7 @@ static const mstmm_port mstmm_sweep_generic0_tangent_carrier_outputs[] = {
  * in  J[0] (kg*m2 or kg) rotor inertia reflected to the speeds
  * in  laws[0] change of the laws' efforts
  * out B[9] motion along the direction
- * out G[6] change of the load that is carried
+ * out G[6] change of the carried load
  * out row[0] change of the rows by load, rotors and laws
  */
 int mstmm_sweep_generic0_tangent_column(const real *restrict theta, const real *restrict x,
@@ -2122,10 +2122,10 @@ static const mstmm_port mstmm_sweep_generic0_tangent_column_outputs[] = {
     {"row", 0, "", 0, 0},
 };
 
-/* what a hinge with 0 speeds lets go and holds
+/* free and constrained directions of a hinge with 0 speeds
  * source: Householder, J. ACM 5 (1958) 339-342 (reflections)
  * in  H[6][0] motion subspace
- * out W[6][6] rows: H^+, then what the hinge holds
+ * out W[6][6] rows: H^+, then the constrained directions
  */
 int mstmm_sweep_generic0_complement(const real *restrict H, real *restrict W)
 {
@@ -2780,7 +2780,7 @@ static const mstmm_kernel mstmm_sweep_generic0_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic0_forward_inputs,
         .outputs = mstmm_sweep_generic0_forward_outputs,
-        .ir_hash = "26e3e94fb01bef0ed84c855e5b18a767beb301039702f741bbbac82b64d9ef57",
+        .ir_hash = "9f67d877454e555765f569cc79b7fa4ef84f8fc85a7a68fd3f1a23aabff02c92",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -2840,7 +2840,7 @@ static const mstmm_kernel mstmm_sweep_generic0_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic0_factor_inputs,
         .outputs = mstmm_sweep_generic0_factor_outputs,
-        .ir_hash = "35f2cb333bc02b3b9496907f0fcde6bb2ad7e87e810fdf5e0aacb2f2eb0ff5bc",
+        .ir_hash = "7b695fe71188644e26b6557526444afcefa0c48210c76705d2b856839ac3b0ce",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -2852,7 +2852,7 @@ static const mstmm_kernel mstmm_sweep_generic0_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic0_push_inputs,
         .outputs = mstmm_sweep_generic0_push_outputs,
-        .ir_hash = "c30bbbd9317c1f165561732308a49f3dca3546f81be459d98d55b5ce7d42a1cb",
+        .ir_hash = "8a384690ab26daabd702f7293119a484abbe29bf85b33fa53ce464437f97d3d3",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -2864,7 +2864,7 @@ static const mstmm_kernel mstmm_sweep_generic0_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic0_answer_inputs,
         .outputs = mstmm_sweep_generic0_answer_outputs,
-        .ir_hash = "1a4f9a9cb4de0ce793048400246fd472c25b162526cba9d33bfdd35c37b9cb3a",
+        .ir_hash = "d67cddc2c2a227d8083b76c2e6da9ede86a0fb78a26533dbdbd8901c91cb2eb3",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -2876,7 +2876,7 @@ static const mstmm_kernel mstmm_sweep_generic0_kernels[] = {
         .n_outputs = 5,
         .inputs = mstmm_sweep_generic0_qr_eliminate_inputs,
         .outputs = mstmm_sweep_generic0_qr_eliminate_outputs,
-        .ir_hash = "8c13e67f46b02021b1d9475422398269c4a37b37cb09d83e956b0901ebe6eeb7",
+        .ir_hash = "42209a670b6e6363e4310b64cd9b26fef3b0a3577a972834e3f1694883565172",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -2900,7 +2900,7 @@ static const mstmm_kernel mstmm_sweep_generic0_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic0_tangent_column_inputs,
         .outputs = mstmm_sweep_generic0_tangent_column_outputs,
-        .ir_hash = "070258be2fe2bf57856349d300557bfee1886a4a94d184abd16c19e25702d850",
+        .ir_hash = "cc1b7096834062706d020315261b07096cdd9b739c0b666eb92c38f522a3f14e",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -2912,7 +2912,7 @@ static const mstmm_kernel mstmm_sweep_generic0_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_generic0_complement_inputs,
         .outputs = mstmm_sweep_generic0_complement_outputs,
-        .ir_hash = "c2466a0c618c33706d663d68823384d3b508ecf8e8aab7af9707278c08f79e63",
+        .ir_hash = "a9b2041f0dcb2168ab3e49c95fd54db10cd01dd9a2d7faa033618c6e25486459",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -2958,7 +2958,7 @@ const mstmm_element mstmm_sweep_generic0 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic0",
-    .hash = "700c2110838f33498507ed20a480ab5c848f0703661ec9e23ee7a4d1a34f4354",
+    .hash = "6d706fa0ac4dd63ca8045b63cb34143debf414a7adb29eb155c4b47840f532a1",
     .nq = 0,
     .nu = 0,
     .np = 0,

@@ -108,7 +108,7 @@ int mstmm_sweep_generic1_pull_slope(const real *restrict y, const real *restrict
 
 #ifndef MSTMM_TWO
 #define MSTMM_TWO
-/* Two numbers at a time, in a register and in an array. */
+/* Pairs of numbers, in a register and in an array. */
 typedef real two_t __attribute__((vector_size(2 * sizeof(real))));
 typedef real two_free_t __attribute__((vector_size(2 * sizeof(real)), aligned(sizeof(real)), may_alias));
 
@@ -123,7 +123,7 @@ static inline __attribute__((always_inline, unused)) two_t mstmm_apart(const rea
 }
 #endif
 
-/* bias motion behind a hinge with 1 speeds
+/* bias motion outboard of a hinge with 1 speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rt[3][3] rotation, inboard hinge axes to parent axes
@@ -1318,7 +1318,7 @@ static const mstmm_guard mstmm_sweep_generic1_project_guards[] = {
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6] motion subspace of the free coordinates
  * in  J[1] (kg*m2 or kg) rotor inertia reflected to the speeds
- * in  W[1] change of the efforts of laws, a row a speed
+ * in  W[1] change of the efforts of laws, one row per speed
  * in  floor[2] (kg, kg*m2) least inertia along and about an axis that is not rounding
  * in  S[21] f = S a + e of everything outboard, at P
  * out F[1] D = L diag(d) L^T: L, and 1 / d on the diagonal
@@ -1864,7 +1864,7 @@ static const mstmm_guard mstmm_sweep_generic1_factor_guards[] = {
     {1, "speed 1 of 1 moves no inertia: its acceleration is undetermined"},
 };
 
-/* load of a column carried across a hinge with 1 free speed
+/* load of a right-hand side carried across a hinge with 1 free speed
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -1872,7 +1872,7 @@ static const mstmm_guard mstmm_sweep_generic1_factor_guards[] = {
  * in  H[6] motion subspace of the free coordinates
  * in  G[1][6] D^-1 H^T S
  * in  e[6] (N, N*m) force part of f = S a + e, at P
- * in  tau[1] (N, N*m) the column's efforts on the free coordinates
+ * in  tau[1] (N, N*m) efforts of the right-hand side on the free coordinates
  * out y[1] (N, N*m) tau - H^T e
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
@@ -2009,7 +2009,7 @@ static const mstmm_port mstmm_sweep_generic1_push_outputs[] = {
     {"e_I", 6, "N, N*m", 1, 0},
 };
 
-/* accelerations that answer a column, across a hinge with 1 free speed
+/* accelerations due to a right-hand side, across a hinge with 1 free speed
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -2124,7 +2124,7 @@ static const mstmm_port mstmm_sweep_generic1_answer_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
-/* rows behind a hinge with 1 free speed
+/* rows outboard of a hinge with 1 free speed
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * source: Gauss, J. reine angew. Math. 4 (1829) 232-235 (least constraint)
@@ -2133,14 +2133,14 @@ static const mstmm_port mstmm_sweep_generic1_answer_outputs[] = {
  * in  J[1] (kg*m2 or kg) rotor inertia reflected to the speeds
  * in  floor[2] (kg, kg*m2) least inertia along and about an axis that is not rounding
  * in  U[21] upper triangle, row by row: S = U^T U
- * in  d[6] load that rows take: f = U^T (U a + d) + e
+ * in  d[6] load in the rows: f = U^T (U a + d) + e
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  tau[1] (N, N*m) efforts on the free coordinates
  * out G[1][6] udot = g - G a_Q
  * out g[1] udot = g - G a_Q
- * out V[21] upper triangle of what is behind the hinge
- * out d_V[6] load that its rows take
- * out e_Q[6] (N, N*m) load that they do not take
+ * out V[21] upper triangle outboard of the hinge
+ * out d_V[6] load in its rows
+ * out e_Q[6] (N, N*m) load outside the rows
  */
 int mstmm_sweep_generic1_qr_eliminate(const real *restrict H, const real *restrict J,
     const real *restrict floor_, const real *restrict U, const real *restrict d,
@@ -2794,14 +2794,14 @@ static const mstmm_port mstmm_sweep_generic1_tangent_carrier_outputs[] = {
 /* a direction of a hinge with 1 speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  theta[3] turn of the body along the direction, body axes
- * in  x[3] change of place of P along the direction, body axes
+ * in  theta[3] rotation of the body along the direction, body axes
+ * in  x[3] displacement of P along the direction, body axes
  * in  H[6]
  * in  s[1]
  * in  v[3]
  * in  w[3]
  * in  Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
- * in  f[6] (N, N*m) load at P that is carried
+ * in  f[6] (N, N*m) carried load at P
  * in  d_H[6]
  * in  d_v[3]
  * in  d_w[3]
@@ -2810,7 +2810,7 @@ static const mstmm_port mstmm_sweep_generic1_tangent_carrier_outputs[] = {
  * in  J[1] (kg*m2 or kg) rotor inertia reflected to the speeds
  * in  laws[1] change of the laws' efforts
  * out B[9] motion along the direction
- * out G[6] change of the load that is carried
+ * out G[6] change of the carried load
  * out row[1] change of the rows by load, rotors and laws
  */
 int mstmm_sweep_generic1_tangent_column(const real *restrict theta, const real *restrict x,
@@ -3063,13 +3063,13 @@ static const mstmm_port mstmm_sweep_generic1_tangent_column_outputs[] = {
     {"row", 1, "", 0, 0},
 };
 
-/* turn and change of place along coordinates of a hinge with 1 free speed
+/* rotation and displacement along coordinates of a hinge with 1 free speed
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  H[6]
  * in  d_q[1]
- * out theta[3] turn of the body along the direction, body axes
- * out x[3] change of place of P along the direction, body axes
+ * out theta[3] rotation of the body along the direction, body axes
+ * out x[3] displacement of P along the direction, body axes
  */
 int mstmm_sweep_generic1_tangent_along(const real *restrict H, const real *restrict d_q,
     real *restrict theta, real *restrict x)
@@ -3108,19 +3108,19 @@ static const mstmm_port mstmm_sweep_generic1_tangent_along_outputs[] = {
 /* a direction of a hinge with 1 free speed, whose subspace is constant
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  theta[3] turn of the body along the direction, body axes
- * in  x[3] change of place of P along the direction, body axes
+ * in  theta[3] rotation of the body along the direction, body axes
+ * in  x[3] displacement of P along the direction, body axes
  * in  H[6]
  * in  v[3]
  * in  w[3]
  * in  Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
- * in  f[6] (N, N*m) load at P that is carried
+ * in  f[6] (N, N*m) carried load at P
  * in  d_u[1]
  * in  d_s[1]
  * in  J[1] (kg*m2 or kg) rotor inertia reflected to the speeds
  * in  laws[1] change of the laws' efforts
  * out B[9] motion along the direction
- * out G[6] change of the load that is carried
+ * out G[6] change of the carried load
  * out row[1] change of the rows by load, rotors and laws
  */
 int mstmm_sweep_generic1_tangent_steady(const real *restrict theta, const real *restrict x,
@@ -3368,20 +3368,20 @@ static const mstmm_port mstmm_sweep_generic1_tangent_steady_outputs[] = {
     {"row", 1, "", 0, 0},
 };
 
-/* a direction of a hinge with 1 free speed, which turns about constant axes
+/* a direction of a hinge with 1 free speed, which rotates about constant axes
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  theta[3] turn of the body along the direction, body axes
+ * in  theta[3] rotation of the body along the direction, body axes
  * in  H[6]
  * in  w[3]
  * in  Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
- * in  f[6] (N, N*m) load at P that is carried
+ * in  f[6] (N, N*m) carried load at P
  * in  d_u[1]
  * in  d_s[1]
  * in  J[1] (kg*m2 or kg) rotor inertia reflected to the speeds
  * in  laws[1] change of the laws' efforts
  * out B[9] motion along the direction
- * out G[6] change of the load that is carried
+ * out G[6] change of the carried load
  * out row[1] change of the rows by load, rotors and laws
  */
 int mstmm_sweep_generic1_tangent_turning(const real *restrict theta, const real *restrict H,
@@ -3520,9 +3520,9 @@ static const mstmm_port mstmm_sweep_generic1_tangent_turning_outputs[] = {
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  H[6] motion subspace of the unknowns
  * in  B[1][9] motion along the unknowns
- * in  W[1] slopes of the rows, a row a direction
- * in  S[9][6] change of the load by that of the motion, a row an entry
- * out K[1][6] S B, a row a direction
+ * in  W[1] derivatives of the rows, one row per direction
+ * in  S[9][6] change of the load by that of the motion, one row per entry
+ * out K[1][6] S B, one row per direction
  * out right[1][9] rows by the motion
  * out D[1] rows by unknowns
  * out one[1] unit matrix
@@ -3622,11 +3622,11 @@ static const mstmm_port mstmm_sweep_generic1_tangent_rows_outputs[] = {
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  inverse[1] D^-1
  * in  right[1][9] rows by the motion
- * in  K[1][6] S B, a row a direction
- * in  G[1][6] change of the load that is carried
+ * in  K[1][6] S B, one row per direction
+ * in  G[1][6] change of the carried load
  * out gain[1][9] D^-1 times the rows by the motion
- * out V[1][6] K + G, a row a direction
- * out S[9][6] change of the load by that of the motion, a row an entry, added to what is there
+ * out V[1][6] K + G, one row per direction
+ * out S[9][6] change of the load by that of the motion, one row per entry, added to what is there
  */
 int mstmm_sweep_generic1_tangent_reduce(const real *restrict inverse, const real *restrict right,
     const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
@@ -3692,11 +3692,11 @@ static const mstmm_port mstmm_sweep_generic1_tangent_reduce_outputs[] = {
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6] motion subspace of the unknowns
- * in  V[1][6] K + G, a row a direction
+ * in  V[1][6] K + G, one row per direction
  * in  inverse[1] D^-1
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  e_f[1] load of the rows
- * out y[1] D^-1 times what is left of the rows
+ * out y[1] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
 int mstmm_sweep_generic1_tangent_push(const real *restrict Rc, const real *restrict r,
@@ -3835,7 +3835,7 @@ static const mstmm_port mstmm_sweep_generic1_tangent_push_outputs[] = {
     {"e_I", 6, "N, N*m", 1, 0},
 };
 
-/* unknowns of a hinge with 1 free speed that answer a right-hand side
+/* solution of a hinge with 1 free speed for a right-hand side
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -3846,7 +3846,7 @@ static const mstmm_port mstmm_sweep_generic1_tangent_push_outputs[] = {
  * in  z_I[9] change of the parent's motion, parent axes
  * in  B[1][9] motion along the unknowns
  * in  gain[1][9] D^-1 times the rows by the motion
- * in  y[1] D^-1 times what is left of the rows
+ * in  y[1] D^-1 times the remainder of the rows
  * out x[1] unknowns
  * out z[9] change of the body's motion, own axes
  */
@@ -4053,18 +4053,18 @@ static const mstmm_port mstmm_sweep_generic1_tangent_answer_outputs[] = {
     {"z", 9, "", 0, 0},
 };
 
-/* a right-hand side carried across a hinge with 1 free speed and increments that are known
+/* a right-hand side carried across a hinge with 1 free speed and known increments
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6] motion subspace of the unknowns
- * in  V[1][6] K + G, a row a direction
+ * in  V[1][6] K + G, one row per direction
  * in  inverse[1] D^-1
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  e_f[1] load of the rows
- * in  e_b[6] (N, N*m) load by what is known, without the unknowns
- * out y[1] D^-1 times what is left of the rows
+ * in  e_b[6] (N, N*m) load due to known increments, without the unknowns
+ * out y[1] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
 int mstmm_sweep_generic1_tangent_push_known(const real *restrict Rc, const real *restrict r,
@@ -4211,7 +4211,7 @@ static const mstmm_port mstmm_sweep_generic1_tangent_push_known_outputs[] = {
     {"e_I", 6, "N, N*m", 1, 0},
 };
 
-/* unknowns of a hinge with 1 free speed that answer a right-hand side and increments that are known
+/* solution of a hinge with 1 free speed for a right-hand side and known increments
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -4222,8 +4222,8 @@ static const mstmm_port mstmm_sweep_generic1_tangent_push_known_outputs[] = {
  * in  z_I[9] change of the parent's motion, parent axes
  * in  B[1][9] motion along the unknowns
  * in  gain[1][9] D^-1 times the rows by the motion
- * in  y[1] D^-1 times what is left of the rows
- * in  b[9] change of motion that is known
+ * in  y[1] D^-1 times the remainder of the rows
+ * in  b[9] known change of motion
  * out x[1] unknowns
  * out z[9] change of the body's motion, own axes
  */
@@ -4440,10 +4440,10 @@ static const mstmm_port mstmm_sweep_generic1_tangent_answer_known_outputs[] = {
     {"z", 9, "", 0, 0},
 };
 
-/* what a hinge with 1 speeds lets go and holds
+/* free and constrained directions of a hinge with 1 speeds
  * source: Householder, J. ACM 5 (1958) 339-342 (reflections)
  * in  H[6] motion subspace
- * out W[6][6] rows: H^+, then what the hinge holds
+ * out W[6][6] rows: H^+, then the constrained directions
  */
 int mstmm_sweep_generic1_complement(const real *restrict H, real *restrict W)
 {
@@ -4638,7 +4638,7 @@ static const mstmm_port mstmm_sweep_generic1_couple_outputs[] = {
     {"L_ij", 1, "", 1, 0},
 };
 
-/* what a hinge with 1 speeds tells a row
+/* contribution of a hinge with 1 speeds to a row
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  y[1] tau - H^T e
@@ -4668,7 +4668,7 @@ static const mstmm_port mstmm_sweep_generic1_answered_outputs[] = {
     {"l", 1, "", 1, 0},
 };
 
-/* a multiplier felt by a hinge with 1 speeds
+/* contribution of a multiplier to a hinge with 1 speeds
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  y[1] of the row
@@ -4697,7 +4697,7 @@ static const mstmm_port mstmm_sweep_generic1_pull_outputs[] = {
     {"y_0", 1, "", 1, 0},
 };
 
-/* load of what a hinge with 1 speeds accelerates
+/* load of the bodies accelerated by a hinge with 1 speeds
  * in  S[21] inertia of everything outboard, at P
  * in  H[6] motion subspace
  * in  udot[1] accelerations of the coordinates
@@ -4803,12 +4803,12 @@ static const mstmm_port mstmm_sweep_generic1_exerted_outputs[] = {
     {"e", 6, "N, N*m", 0, 0},
 };
 
-/* load of a column felt by a hinge on the ground with 1 free speed
+/* load of a right-hand side along a hinge on the ground with 1 free speed
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  H[6] motion subspace of the free coordinates
  * in  e[6] (N, N*m) force part of f = S a + e, at P
- * in  tau[1] (N, N*m) the column's efforts on the free coordinates
+ * in  tau[1] (N, N*m) efforts of the right-hand side on the free coordinates
  * out y[1] (N, N*m) tau - H^T e
  */
 int mstmm_sweep_generic1_push_on_ground(const real *restrict H, const real *restrict e,
@@ -5728,7 +5728,7 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic1_forward_inputs,
         .outputs = mstmm_sweep_generic1_forward_outputs,
-        .ir_hash = "6f01f155047f1b32c77ad652ccfa750ac124fc96ceb70951fd1648854609803e",
+        .ir_hash = "ddc2ccfbd08e65c2f687ed9352f821c351e7dbc450707346b03fc416d34e9553",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5788,7 +5788,7 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic1_factor_inputs,
         .outputs = mstmm_sweep_generic1_factor_outputs,
-        .ir_hash = "358fef5cfd361a5fa196900a2ef14d1eec558c645c571069b2e9fad989d3ad00",
+        .ir_hash = "e822f4a56f680d1341eb74e0adcbf39229d116481b85562a0e03eb89bc67f4c4",
         .n_guards = 2,
         .guards = mstmm_sweep_generic1_factor_guards,
     },
@@ -5800,7 +5800,7 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic1_push_inputs,
         .outputs = mstmm_sweep_generic1_push_outputs,
-        .ir_hash = "c9969b7fdb300e673ea805d41287ff7858e4912a4393b68580ac50006b242799",
+        .ir_hash = "cdd1e80732c06f4cf1b7621536a4b8d43e9a7c9857ac397f480c713179d1ddb6",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5812,7 +5812,7 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic1_answer_inputs,
         .outputs = mstmm_sweep_generic1_answer_outputs,
-        .ir_hash = "01e6d7b934f73c0ab2544ce4c046f548cb3f7874833e5200e68c2e25d059ed26",
+        .ir_hash = "d05edbd62e165f6eb85b17e9198756799e728fd4406fbc31a7d2badb7dc3cf2b",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5824,7 +5824,7 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .n_outputs = 5,
         .inputs = mstmm_sweep_generic1_qr_eliminate_inputs,
         .outputs = mstmm_sweep_generic1_qr_eliminate_outputs,
-        .ir_hash = "35ccb9bc7b54544bfd75cf6e1f158443e83d19957f949779e6b7f0f4902bd753",
+        .ir_hash = "9e6f7f9d61b99e3635a14c3c99ac5f34ae3fa49e6f66576d61f0d9ab9c3b2c7b",
         .n_guards = 2,
         .guards = mstmm_sweep_generic1_qr_eliminate_guards,
     },
@@ -5848,7 +5848,7 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic1_tangent_column_inputs,
         .outputs = mstmm_sweep_generic1_tangent_column_outputs,
-        .ir_hash = "11e51267ea254c7a784a06f57ce511bc29a470910b9900de9604507143ff0763",
+        .ir_hash = "1ac39035da6f0d43e96a15aecb5a9cb067afdbe85a9fa02711aef1f32b1b3197",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5860,7 +5860,7 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic1_tangent_along_inputs,
         .outputs = mstmm_sweep_generic1_tangent_along_outputs,
-        .ir_hash = "dc1afab64fd2d06bf296ac3636201e900f62accdc009bbd4b9baf875a0951962",
+        .ir_hash = "a0f8daab22b87a9f49d9c375f9467657511ee8dee4db99527ea115c3269a279b",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5872,7 +5872,7 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic1_tangent_steady_inputs,
         .outputs = mstmm_sweep_generic1_tangent_steady_outputs,
-        .ir_hash = "2dd883ff892ff5e015332ef839cb3a62111a45ea809464569d0fed2f74a95629",
+        .ir_hash = "17616ee422027c3ee26ca93b9e8f5bb250f30d959134192f6e89b0187a186627",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5884,7 +5884,7 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic1_tangent_turning_inputs,
         .outputs = mstmm_sweep_generic1_tangent_turning_outputs,
-        .ir_hash = "ae584d3ab2295d46f607be74345f8392d9f8864e4c2c5564e6796f83c38ce308",
+        .ir_hash = "e314cfff8eac5683a1414e071976f5d9c8d65bba5eef7ac144bc13c98cfcf0b0",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5896,7 +5896,7 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_sweep_generic1_tangent_rows_inputs,
         .outputs = mstmm_sweep_generic1_tangent_rows_outputs,
-        .ir_hash = "3c174e8635b7d58f6266cf8964dd73652df3a67002de24802f9e50df5bc55503",
+        .ir_hash = "7d1d397d44c5ac2e9dfb99a0a4db4466343960b334c7923f9eccf78090dcc606",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5908,7 +5908,7 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic1_tangent_reduce_inputs,
         .outputs = mstmm_sweep_generic1_tangent_reduce_outputs,
-        .ir_hash = "133177d11f175a0e459e42d80c13018938437a97ca181f4ef732216ed18c9588",
+        .ir_hash = "c67fb1fad1556554cb2bd0b07b1f8bee7d8d897a2e733263b9692dc2b5d84a93",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5920,7 +5920,7 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic1_tangent_push_inputs,
         .outputs = mstmm_sweep_generic1_tangent_push_outputs,
-        .ir_hash = "497b67229d2d80a2c7bcef411da3968a7d029ee94d624f654eee0dacd1cf2b22",
+        .ir_hash = "a5e6165cda24366934f1d71c2e26742861a6779e3c9817c7d2c447fee0542c93",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5932,7 +5932,7 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic1_tangent_answer_inputs,
         .outputs = mstmm_sweep_generic1_tangent_answer_outputs,
-        .ir_hash = "1ca9ca5f194feb8eb7471ac4145ac220cbbde99bd3f5e5df8c4fabc86d6dcc30",
+        .ir_hash = "1341dcff3cb24c0357d88593a1567c22dc6b0638070bcb6b4d674c371a7f27ff",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5944,7 +5944,7 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic1_tangent_push_known_inputs,
         .outputs = mstmm_sweep_generic1_tangent_push_known_outputs,
-        .ir_hash = "8011a3be5258bfbfbea35873d961e14128d9b46784ed213bc3f01bd425157e4f",
+        .ir_hash = "73d9cb0fb02787d9d6edb5f990b957e0c915d165ec5b8905073fec5396cdca38",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5956,7 +5956,7 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic1_tangent_answer_known_inputs,
         .outputs = mstmm_sweep_generic1_tangent_answer_known_outputs,
-        .ir_hash = "0437498f9b0bcf10cc2918f799dde341be1c0b2ccfc2903afbd38bccdddf2530",
+        .ir_hash = "aec70611f3efbffbdc2969ba62109320a98d86cd0c437e3dc57827eac8c4145d",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5968,7 +5968,7 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_generic1_complement_inputs,
         .outputs = mstmm_sweep_generic1_complement_outputs,
-        .ir_hash = "61bb4bce2c1ddf6de93723c4866798d2c0e25822a2bee0b2c8a8a00861049c85",
+        .ir_hash = "49e82f52039709002fa21e6c8341c2f45ffc52fd4ebb8a963ac4adf6ac8c0ece",
         .n_guards = 1,
         .guards = mstmm_sweep_generic1_complement_guards,
     },
@@ -6004,7 +6004,7 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_generic1_answered_inputs,
         .outputs = mstmm_sweep_generic1_answered_outputs,
-        .ir_hash = "c563961e7225e7408dfa25614f69fe201a02eeabb5b2c3030f048f53d9d60b1d",
+        .ir_hash = "b40a8723845ea02670aa0bb72f35bcb8838edcafe556363158a2884ae7e597a1",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -6016,7 +6016,7 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_generic1_pull_inputs,
         .outputs = mstmm_sweep_generic1_pull_outputs,
-        .ir_hash = "bfb012c3fd8a221c623bad7749f477c7aa9dade41c364103be3e2b529d6bf41b",
+        .ir_hash = "30094eb52e237e93c9c0e41a16faa9ffc680b97d51a2884bbaee2da82f30fc6e",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -6028,7 +6028,7 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_generic1_exerted_inputs,
         .outputs = mstmm_sweep_generic1_exerted_outputs,
-        .ir_hash = "1fabdff00b4298bee59ba91b7224345d746abc1e7e8756d533ff43e1d293534e",
+        .ir_hash = "7402757c18cfd2604f5527ae5368e6a49b536d73a01ecfde0f78508a810d7337",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -6040,7 +6040,7 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_generic1_push_on_ground_inputs,
         .outputs = mstmm_sweep_generic1_push_on_ground_outputs,
-        .ir_hash = "b7a365f8ab5b86af2acd372bae1b210020b8a2291f305ca7a26d2eaa0b996adc",
+        .ir_hash = "f2ab8595d1ec9a77e3d5feff3f64be7efb397d5f18f98c5c9149b66640ccb19e",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -6110,7 +6110,7 @@ const mstmm_element mstmm_sweep_generic1 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic1",
-    .hash = "91917e96cd1e545e87f72684932de95628858e6e56e16cf28e3aba9dcc2df9f4",
+    .hash = "0f1be558fbadf414322a26e299e939ad1ce7695c151f2ec49f539f2ad6fb18a4",
     .nq = 0,
     .nu = 0,
     .np = 0,

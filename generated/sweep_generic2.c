@@ -108,7 +108,7 @@ int mstmm_sweep_generic2_pull_slope(const real *restrict y, const real *restrict
 
 #ifndef MSTMM_TWO
 #define MSTMM_TWO
-/* Two numbers at a time, in a register and in an array. */
+/* Pairs of numbers, in a register and in an array. */
 typedef real two_t __attribute__((vector_size(2 * sizeof(real))));
 typedef real two_free_t __attribute__((vector_size(2 * sizeof(real)), aligned(sizeof(real)), may_alias));
 
@@ -123,7 +123,7 @@ static inline __attribute__((always_inline, unused)) two_t mstmm_apart(const rea
 }
 #endif
 
-/* bias motion behind a hinge with 2 speeds
+/* bias motion outboard of a hinge with 2 speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rt[3][3] rotation, inboard hinge axes to parent axes
@@ -1637,7 +1637,7 @@ static const mstmm_guard mstmm_sweep_generic2_project_guards[] = {
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][2] motion subspace of the free coordinates
  * in  J[2] (kg*m2 or kg) rotor inertia reflected to the speeds
- * in  W[2][2] change of the efforts of laws, a row a speed
+ * in  W[2][2] change of the efforts of laws, one row per speed
  * in  floor[2] (kg, kg*m2) least inertia along and about an axis that is not rounding
  * in  S[21] f = S a + e of everything outboard, at P
  * out F[2][2] D = L diag(d) L^T: L, and 1 / d on the diagonal
@@ -2381,7 +2381,7 @@ static const mstmm_guard mstmm_sweep_generic2_factor_guards[] = {
     {1, "speed 2 of 2 moves no inertia: its acceleration is undetermined"},
 };
 
-/* load of a column carried across a hinge with 2 free speeds
+/* load of a right-hand side carried across a hinge with 2 free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -2389,7 +2389,7 @@ static const mstmm_guard mstmm_sweep_generic2_factor_guards[] = {
  * in  H[6][2] motion subspace of the free coordinates
  * in  G[2][6] D^-1 H^T S
  * in  e[6] (N, N*m) force part of f = S a + e, at P
- * in  tau[2] (N, N*m) the column's efforts on the free coordinates
+ * in  tau[2] (N, N*m) efforts of the right-hand side on the free coordinates
  * out y[2] (N, N*m) tau - H^T e
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
@@ -2551,7 +2551,7 @@ static const mstmm_port mstmm_sweep_generic2_push_outputs[] = {
     {"e_I", 6, "N, N*m", 1, 0},
 };
 
-/* accelerations that answer a column, across a hinge with 2 free speeds
+/* accelerations due to a right-hand side, across a hinge with 2 free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -2696,7 +2696,7 @@ static const mstmm_port mstmm_sweep_generic2_answer_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
-/* rows behind a hinge with 2 free speeds
+/* rows outboard of a hinge with 2 free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * source: Gauss, J. reine angew. Math. 4 (1829) 232-235 (least constraint)
@@ -2705,14 +2705,14 @@ static const mstmm_port mstmm_sweep_generic2_answer_outputs[] = {
  * in  J[2] (kg*m2 or kg) rotor inertia reflected to the speeds
  * in  floor[2] (kg, kg*m2) least inertia along and about an axis that is not rounding
  * in  U[21] upper triangle, row by row: S = U^T U
- * in  d[6] load that rows take: f = U^T (U a + d) + e
+ * in  d[6] load in the rows: f = U^T (U a + d) + e
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  tau[2] (N, N*m) efforts on the free coordinates
  * out G[2][6] udot = g - G a_Q
  * out g[2] udot = g - G a_Q
- * out V[21] upper triangle of what is behind the hinge
- * out d_V[6] load that its rows take
- * out e_Q[6] (N, N*m) load that they do not take
+ * out V[21] upper triangle outboard of the hinge
+ * out d_V[6] load in its rows
+ * out e_Q[6] (N, N*m) load outside the rows
  */
 int mstmm_sweep_generic2_qr_eliminate(const real *restrict H, const real *restrict J,
     const real *restrict floor_, const real *restrict U, const real *restrict d,
@@ -3727,14 +3727,14 @@ static const mstmm_port mstmm_sweep_generic2_tangent_carrier_outputs[] = {
 /* a direction of a hinge with 2 speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  theta[3] turn of the body along the direction, body axes
- * in  x[3] change of place of P along the direction, body axes
+ * in  theta[3] rotation of the body along the direction, body axes
+ * in  x[3] displacement of P along the direction, body axes
  * in  H[6][2]
  * in  s[2]
  * in  v[3]
  * in  w[3]
  * in  Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
- * in  f[6] (N, N*m) load at P that is carried
+ * in  f[6] (N, N*m) carried load at P
  * in  d_H[6][2]
  * in  d_v[3]
  * in  d_w[3]
@@ -3743,7 +3743,7 @@ static const mstmm_port mstmm_sweep_generic2_tangent_carrier_outputs[] = {
  * in  J[2] (kg*m2 or kg) rotor inertia reflected to the speeds
  * in  laws[2] change of the laws' efforts
  * out B[9] motion along the direction
- * out G[6] change of the load that is carried
+ * out G[6] change of the carried load
  * out row[2] change of the rows by load, rotors and laws
  */
 int mstmm_sweep_generic2_tangent_column(const real *restrict theta, const real *restrict x,
@@ -4035,13 +4035,13 @@ static const mstmm_port mstmm_sweep_generic2_tangent_column_outputs[] = {
     {"row", 2, "", 0, 0},
 };
 
-/* turn and change of place along coordinates of a hinge with 2 free speeds
+/* rotation and displacement along coordinates of a hinge with 2 free speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  H[6][2]
  * in  d_q[2]
- * out theta[3] turn of the body along the direction, body axes
- * out x[3] change of place of P along the direction, body axes
+ * out theta[3] rotation of the body along the direction, body axes
+ * out x[3] displacement of P along the direction, body axes
  */
 int mstmm_sweep_generic2_tangent_along(const real *restrict H, const real *restrict d_q,
     real *restrict theta, real *restrict x)
@@ -4092,19 +4092,19 @@ static const mstmm_port mstmm_sweep_generic2_tangent_along_outputs[] = {
 /* a direction of a hinge with 2 free speeds, whose subspace is constant
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  theta[3] turn of the body along the direction, body axes
- * in  x[3] change of place of P along the direction, body axes
+ * in  theta[3] rotation of the body along the direction, body axes
+ * in  x[3] displacement of P along the direction, body axes
  * in  H[6][2]
  * in  v[3]
  * in  w[3]
  * in  Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
- * in  f[6] (N, N*m) load at P that is carried
+ * in  f[6] (N, N*m) carried load at P
  * in  d_u[2]
  * in  d_s[2]
  * in  J[2] (kg*m2 or kg) rotor inertia reflected to the speeds
  * in  laws[2] change of the laws' efforts
  * out B[9] motion along the direction
- * out G[6] change of the load that is carried
+ * out G[6] change of the carried load
  * out row[2] change of the rows by load, rotors and laws
  */
 int mstmm_sweep_generic2_tangent_steady(const real *restrict theta, const real *restrict x,
@@ -4379,20 +4379,20 @@ static const mstmm_port mstmm_sweep_generic2_tangent_steady_outputs[] = {
     {"row", 2, "", 0, 0},
 };
 
-/* a direction of a hinge with 2 free speeds, which turns about constant axes
+/* a direction of a hinge with 2 free speeds, which rotates about constant axes
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  theta[3] turn of the body along the direction, body axes
+ * in  theta[3] rotation of the body along the direction, body axes
  * in  H[6][2]
  * in  w[3]
  * in  Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
- * in  f[6] (N, N*m) load at P that is carried
+ * in  f[6] (N, N*m) carried load at P
  * in  d_u[2]
  * in  d_s[2]
  * in  J[2] (kg*m2 or kg) rotor inertia reflected to the speeds
  * in  laws[2] change of the laws' efforts
  * out B[9] motion along the direction
- * out G[6] change of the load that is carried
+ * out G[6] change of the carried load
  * out row[2] change of the rows by load, rotors and laws
  */
 int mstmm_sweep_generic2_tangent_turning(const real *restrict theta, const real *restrict H,
@@ -4546,9 +4546,9 @@ static const mstmm_port mstmm_sweep_generic2_tangent_turning_outputs[] = {
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  H[6][2] motion subspace of the unknowns
  * in  B[2][9] motion along the unknowns
- * in  W[2][2] slopes of the rows, a row a direction
- * in  S[9][6] change of the load by that of the motion, a row an entry
- * out K[2][6] S B, a row a direction
+ * in  W[2][2] derivatives of the rows, one row per direction
+ * in  S[9][6] change of the load by that of the motion, one row per entry
+ * out K[2][6] S B, one row per direction
  * out right[2][9] rows by the motion
  * out D[2][2] rows by unknowns
  * out one[2][2] unit matrix
@@ -4720,11 +4720,11 @@ static const mstmm_port mstmm_sweep_generic2_tangent_rows_outputs[] = {
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  inverse[2][2] D^-1
  * in  right[2][9] rows by the motion
- * in  K[2][6] S B, a row a direction
- * in  G[2][6] change of the load that is carried
+ * in  K[2][6] S B, one row per direction
+ * in  G[2][6] change of the carried load
  * out gain[2][9] D^-1 times the rows by the motion
- * out V[2][6] K + G, a row a direction
- * out S[9][6] change of the load by that of the motion, a row an entry, added to what is there
+ * out V[2][6] K + G, one row per direction
+ * out S[9][6] change of the load by that of the motion, one row per entry, added to what is there
  */
 int mstmm_sweep_generic2_tangent_reduce(const real *restrict inverse, const real *restrict right,
     const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
@@ -4820,11 +4820,11 @@ static const mstmm_port mstmm_sweep_generic2_tangent_reduce_outputs[] = {
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][2] motion subspace of the unknowns
- * in  V[2][6] K + G, a row a direction
+ * in  V[2][6] K + G, one row per direction
  * in  inverse[2][2] D^-1
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  e_f[2] load of the rows
- * out y[2] D^-1 times what is left of the rows
+ * out y[2] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
 int mstmm_sweep_generic2_tangent_push(const real *restrict Rc, const real *restrict r,
@@ -4994,7 +4994,7 @@ static const mstmm_port mstmm_sweep_generic2_tangent_push_outputs[] = {
     {"e_I", 6, "N, N*m", 1, 0},
 };
 
-/* unknowns of a hinge with 2 free speeds that answer a right-hand side
+/* solution of a hinge with 2 free speeds for a right-hand side
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -5005,7 +5005,7 @@ static const mstmm_port mstmm_sweep_generic2_tangent_push_outputs[] = {
  * in  z_I[9] change of the parent's motion, parent axes
  * in  B[2][9] motion along the unknowns
  * in  gain[2][9] D^-1 times the rows by the motion
- * in  y[2] D^-1 times what is left of the rows
+ * in  y[2] D^-1 times the remainder of the rows
  * out x[2] unknowns
  * out z[9] change of the body's motion, own axes
  */
@@ -5249,18 +5249,18 @@ static const mstmm_port mstmm_sweep_generic2_tangent_answer_outputs[] = {
     {"z", 9, "", 0, 0},
 };
 
-/* a right-hand side carried across a hinge with 2 free speeds and increments that are known
+/* a right-hand side carried across a hinge with 2 free speeds and known increments
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][2] motion subspace of the unknowns
- * in  V[2][6] K + G, a row a direction
+ * in  V[2][6] K + G, one row per direction
  * in  inverse[2][2] D^-1
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  e_f[2] load of the rows
- * in  e_b[6] (N, N*m) load by what is known, without the unknowns
- * out y[2] D^-1 times what is left of the rows
+ * in  e_b[6] (N, N*m) load due to known increments, without the unknowns
+ * out y[2] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
 int mstmm_sweep_generic2_tangent_push_known(const real *restrict Rc, const real *restrict r,
@@ -5438,7 +5438,7 @@ static const mstmm_port mstmm_sweep_generic2_tangent_push_known_outputs[] = {
     {"e_I", 6, "N, N*m", 1, 0},
 };
 
-/* unknowns of a hinge with 2 free speeds that answer a right-hand side and increments that are known
+/* solution of a hinge with 2 free speeds for a right-hand side and known increments
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -5449,8 +5449,8 @@ static const mstmm_port mstmm_sweep_generic2_tangent_push_known_outputs[] = {
  * in  z_I[9] change of the parent's motion, parent axes
  * in  B[2][9] motion along the unknowns
  * in  gain[2][9] D^-1 times the rows by the motion
- * in  y[2] D^-1 times what is left of the rows
- * in  b[9] change of motion that is known
+ * in  y[2] D^-1 times the remainder of the rows
+ * in  b[9] known change of motion
  * out x[2] unknowns
  * out z[9] change of the body's motion, own axes
  */
@@ -5704,10 +5704,10 @@ static const mstmm_port mstmm_sweep_generic2_tangent_answer_known_outputs[] = {
     {"z", 9, "", 0, 0},
 };
 
-/* what a hinge with 2 speeds lets go and holds
+/* free and constrained directions of a hinge with 2 speeds
  * source: Householder, J. ACM 5 (1958) 339-342 (reflections)
  * in  H[6][2] motion subspace
- * out W[6][6] rows: H^+, then what the hinge holds
+ * out W[6][6] rows: H^+, then the constrained directions
  */
 int mstmm_sweep_generic2_complement(const real *restrict H, real *restrict W)
 {
@@ -6088,7 +6088,7 @@ static const mstmm_port mstmm_sweep_generic2_couple_outputs[] = {
     {"L_ij", 1, "", 1, 0},
 };
 
-/* what a hinge with 2 speeds tells a row
+/* contribution of a hinge with 2 speeds to a row
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  y[2] tau - H^T e
@@ -6120,7 +6120,7 @@ static const mstmm_port mstmm_sweep_generic2_answered_outputs[] = {
     {"l", 1, "", 1, 0},
 };
 
-/* a multiplier felt by a hinge with 2 speeds
+/* contribution of a multiplier to a hinge with 2 speeds
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  y[2] of the row
@@ -6151,7 +6151,7 @@ static const mstmm_port mstmm_sweep_generic2_pull_outputs[] = {
     {"y_0", 2, "", 1, 0},
 };
 
-/* load of what a hinge with 2 speeds accelerates
+/* load of the bodies accelerated by a hinge with 2 speeds
  * in  S[21] inertia of everything outboard, at P
  * in  H[6][2] motion subspace
  * in  udot[2] accelerations of the coordinates
@@ -6335,12 +6335,12 @@ static const mstmm_port mstmm_sweep_generic2_exerted_outputs[] = {
     {"e", 6, "N, N*m", 0, 0},
 };
 
-/* load of a column felt by a hinge on the ground with 2 free speeds
+/* load of a right-hand side along a hinge on the ground with 2 free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  H[6][2] motion subspace of the free coordinates
  * in  e[6] (N, N*m) force part of f = S a + e, at P
- * in  tau[2] (N, N*m) the column's efforts on the free coordinates
+ * in  tau[2] (N, N*m) efforts of the right-hand side on the free coordinates
  * out y[2] (N, N*m) tau - H^T e
  */
 int mstmm_sweep_generic2_push_on_ground(const real *restrict H, const real *restrict e,
@@ -7805,7 +7805,7 @@ static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic2_forward_inputs,
         .outputs = mstmm_sweep_generic2_forward_outputs,
-        .ir_hash = "feff3e514d914fbd9df70e304a782cf327c779a37e3170ef618718277e7f7ba0",
+        .ir_hash = "144ea1029efd5dde6c568cdc20f2cd3737ef738525baaf0fd7e347be323a598d",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -7865,7 +7865,7 @@ static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic2_factor_inputs,
         .outputs = mstmm_sweep_generic2_factor_outputs,
-        .ir_hash = "ca471fc6ad6ea5382b55939f9c9e86aa92b784005f966da68b214165ec9a6c5c",
+        .ir_hash = "0786041ba7df584596c766a2254976dc93a33a1282fb01f9887b012790ee188a",
         .n_guards = 4,
         .guards = mstmm_sweep_generic2_factor_guards,
     },
@@ -7877,7 +7877,7 @@ static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic2_push_inputs,
         .outputs = mstmm_sweep_generic2_push_outputs,
-        .ir_hash = "8f2bde75895ffe00bd5d9902aef48b2d7348604ab4886b397ec4d02076ea950d",
+        .ir_hash = "41df2f4319793e386e6ef6c8f0278ca294a27f7c0541d57793d21dd95a0e2c53",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -7889,7 +7889,7 @@ static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic2_answer_inputs,
         .outputs = mstmm_sweep_generic2_answer_outputs,
-        .ir_hash = "d04549e53a714922fb69daa2670baea21d963a57d52958c25d02c0c0fcbeecc3",
+        .ir_hash = "b2d4f024389fe634f80c1fae8357af354ebb884cf4d7553a076d291fa396500d",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -7901,7 +7901,7 @@ static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
         .n_outputs = 5,
         .inputs = mstmm_sweep_generic2_qr_eliminate_inputs,
         .outputs = mstmm_sweep_generic2_qr_eliminate_outputs,
-        .ir_hash = "93eda12798f2dffc626e2d1a9536d09d843fa5879013d00446f13909283e4648",
+        .ir_hash = "4c9c2336a7b9f8fea9fb00d79fb316f1d63571245c4351aab36754ca93a23f11",
         .n_guards = 4,
         .guards = mstmm_sweep_generic2_qr_eliminate_guards,
     },
@@ -7925,7 +7925,7 @@ static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic2_tangent_column_inputs,
         .outputs = mstmm_sweep_generic2_tangent_column_outputs,
-        .ir_hash = "0afe7f96a969af818f727efbad20ddbff7d8ed87c12bcca95aee9e2748dddd02",
+        .ir_hash = "d258bf2a8b78eb1f602b22984570d1135bac8e2728138f465753a4444cc0d663",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -7937,7 +7937,7 @@ static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic2_tangent_along_inputs,
         .outputs = mstmm_sweep_generic2_tangent_along_outputs,
-        .ir_hash = "cd7fec4c365af7f2f021fe9e9c905fed78042efa2d186d38e73abfc1f9d5ea96",
+        .ir_hash = "395c6f1460445dcb0225c8bd04582beb849f1c7a98b670520532fc32097dac4a",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -7949,7 +7949,7 @@ static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic2_tangent_steady_inputs,
         .outputs = mstmm_sweep_generic2_tangent_steady_outputs,
-        .ir_hash = "d12ca0eec6519db3d5ac7ab6bfb7b2e6a4770d6e87ef607e89477f41a417f694",
+        .ir_hash = "520c764627cf4097c190da93c6215eee14b499978aea4e5f98ad293be2332967",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -7961,7 +7961,7 @@ static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic2_tangent_turning_inputs,
         .outputs = mstmm_sweep_generic2_tangent_turning_outputs,
-        .ir_hash = "6ab0dc35dce53b53a15c4ffed5a43846ecda0c874627f28f5e9354cc63f244f7",
+        .ir_hash = "55e32894d9595e984a623e2666479f3917a4a92de6a818dbddb7646226505165",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -7973,7 +7973,7 @@ static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_sweep_generic2_tangent_rows_inputs,
         .outputs = mstmm_sweep_generic2_tangent_rows_outputs,
-        .ir_hash = "c31a4175300f6d392330a5f6353c7d2ed73e8d06c3e63613d95f3561d36cc604",
+        .ir_hash = "ee0de2c0fd6f96412b95a8dbb2542aea766117ec349fb55075d2e531ae51fd9a",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -7985,7 +7985,7 @@ static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic2_tangent_reduce_inputs,
         .outputs = mstmm_sweep_generic2_tangent_reduce_outputs,
-        .ir_hash = "06d7d4f131b1fb4e98959d167222bbfad7690237485fa1b479b21ba78847dc9b",
+        .ir_hash = "30f69fe0bf4b1af5409eb9ef412d76f626f526f69e67c8dfcd4107b25c39ad4c",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -7997,7 +7997,7 @@ static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic2_tangent_push_inputs,
         .outputs = mstmm_sweep_generic2_tangent_push_outputs,
-        .ir_hash = "a530c818b996bdeb5f366c67ccc968f3f51be061f2acce53076646dde98ffcc8",
+        .ir_hash = "1dccf910cadb489fb5b6461d3a069cb50210437fa747e6453139191c64f71504",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -8009,7 +8009,7 @@ static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic2_tangent_answer_inputs,
         .outputs = mstmm_sweep_generic2_tangent_answer_outputs,
-        .ir_hash = "92dec4193dac3ae643ee525674280445b421c91384f041de005f9f6e38a6a54c",
+        .ir_hash = "c860bb778406f9742f9d900b74013ac710122fc61045a137d6a8a93c4f244903",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -8021,7 +8021,7 @@ static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic2_tangent_push_known_inputs,
         .outputs = mstmm_sweep_generic2_tangent_push_known_outputs,
-        .ir_hash = "706cd508f4dc19d8bb8b1e8502ffde7735fe11d2b9602c339c84c4ba9036d056",
+        .ir_hash = "bbf81e9b83073535ed29abaca21d3f9021f040ea66fb9bbbeed4524e9cfa47e3",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -8033,7 +8033,7 @@ static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic2_tangent_answer_known_inputs,
         .outputs = mstmm_sweep_generic2_tangent_answer_known_outputs,
-        .ir_hash = "4d011b4994fe76d731af4e93c85ab41900ff0c3e362ff042517744e4682f7ce8",
+        .ir_hash = "324269c09ea01a8f3fee895cea619b08b432089e9314064c09eecfed5d10ec95",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -8045,7 +8045,7 @@ static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_generic2_complement_inputs,
         .outputs = mstmm_sweep_generic2_complement_outputs,
-        .ir_hash = "d86e8b0d89642c1ab62286d817106b871b6ff9455c6d2856fb656ac66d99ff7b",
+        .ir_hash = "11025136447d6ecdd0fa07a9c4383b32bc372ee7fbed616668070a223b03fe0b",
         .n_guards = 2,
         .guards = mstmm_sweep_generic2_complement_guards,
     },
@@ -8081,7 +8081,7 @@ static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_generic2_answered_inputs,
         .outputs = mstmm_sweep_generic2_answered_outputs,
-        .ir_hash = "3b723c3278b5a23f5f8a6ad706098b834d314dd4355988edfecbc682dee7fd73",
+        .ir_hash = "e6d4688144d1a6956c391d05ebe982aa2ff6574425df199955716130d682c433",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -8093,7 +8093,7 @@ static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_generic2_pull_inputs,
         .outputs = mstmm_sweep_generic2_pull_outputs,
-        .ir_hash = "a9ad64910a6bfe6e3af77634a06cae3f3d528fb5652ba6ac4255df30a946b116",
+        .ir_hash = "39b23cc9ae2506bf062c0107cfa3955bff10b497cc5c24c6e56198ca96388c92",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -8105,7 +8105,7 @@ static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_generic2_exerted_inputs,
         .outputs = mstmm_sweep_generic2_exerted_outputs,
-        .ir_hash = "4a45955c76e87c466786a4b357c480a349d720b23243453f6233dd8547c87ddb",
+        .ir_hash = "a73aaedc1404c5b8491ef5fe781ceced4c98216f68f8df8b7a03eaf77d73ee4e",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -8117,7 +8117,7 @@ static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_generic2_push_on_ground_inputs,
         .outputs = mstmm_sweep_generic2_push_on_ground_outputs,
-        .ir_hash = "2ba8fb7a8f92b76a70a041cfd7774570ac91a31dd804ad37f8b9a9a956084493",
+        .ir_hash = "163a24bad65f458d9df70e4002f6790ac78a0b1f08eb69c3b4bd63bb0b74c7aa",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -8187,7 +8187,7 @@ const mstmm_element mstmm_sweep_generic2 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic2",
-    .hash = "37bc397f6f8e58a78da3506e5cbbf0e2b76a85021e0c0b6e783da0735f3f74e6",
+    .hash = "a0216929862b569f5f5e4e81089232b8ce36c52fb13327f33ddb07a792e65805",
     .nq = 0,
     .nu = 0,
     .np = 0,

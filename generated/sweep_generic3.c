@@ -108,7 +108,7 @@ int mstmm_sweep_generic3_pull_slope(const real *restrict y, const real *restrict
 
 #ifndef MSTMM_TWO
 #define MSTMM_TWO
-/* Two numbers at a time, in a register and in an array. */
+/* Pairs of numbers, in a register and in an array. */
 typedef real two_t __attribute__((vector_size(2 * sizeof(real))));
 typedef real two_free_t __attribute__((vector_size(2 * sizeof(real)), aligned(sizeof(real)), may_alias));
 
@@ -123,7 +123,7 @@ static inline __attribute__((always_inline, unused)) two_t mstmm_apart(const rea
 }
 #endif
 
-/* bias motion behind a hinge with 3 speeds
+/* bias motion outboard of a hinge with 3 speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rt[3][3] rotation, inboard hinge axes to parent axes
@@ -2020,7 +2020,7 @@ static const mstmm_guard mstmm_sweep_generic3_project_guards[] = {
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][3] motion subspace of the free coordinates
  * in  J[3] (kg*m2 or kg) rotor inertia reflected to the speeds
- * in  W[3][3] change of the efforts of laws, a row a speed
+ * in  W[3][3] change of the efforts of laws, one row per speed
  * in  floor[2] (kg, kg*m2) least inertia along and about an axis that is not rounding
  * in  S[21] f = S a + e of everything outboard, at P
  * out F[3][3] D = L diag(d) L^T: L, and 1 / d on the diagonal
@@ -3007,7 +3007,7 @@ static const mstmm_guard mstmm_sweep_generic3_factor_guards[] = {
     {1, "speed 3 of 3 moves no inertia: its acceleration is undetermined"},
 };
 
-/* load of a column carried across a hinge with 3 free speeds
+/* load of a right-hand side carried across a hinge with 3 free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -3015,7 +3015,7 @@ static const mstmm_guard mstmm_sweep_generic3_factor_guards[] = {
  * in  H[6][3] motion subspace of the free coordinates
  * in  G[3][6] D^-1 H^T S
  * in  e[6] (N, N*m) force part of f = S a + e, at P
- * in  tau[3] (N, N*m) the column's efforts on the free coordinates
+ * in  tau[3] (N, N*m) efforts of the right-hand side on the free coordinates
  * out y[3] (N, N*m) tau - H^T e
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
@@ -3202,7 +3202,7 @@ static const mstmm_port mstmm_sweep_generic3_push_outputs[] = {
     {"e_I", 6, "N, N*m", 1, 0},
 };
 
-/* accelerations that answer a column, across a hinge with 3 free speeds
+/* accelerations due to a right-hand side, across a hinge with 3 free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -3381,7 +3381,7 @@ static const mstmm_port mstmm_sweep_generic3_answer_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
-/* rows behind a hinge with 3 free speeds
+/* rows outboard of a hinge with 3 free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * source: Gauss, J. reine angew. Math. 4 (1829) 232-235 (least constraint)
@@ -3390,14 +3390,14 @@ static const mstmm_port mstmm_sweep_generic3_answer_outputs[] = {
  * in  J[3] (kg*m2 or kg) rotor inertia reflected to the speeds
  * in  floor[2] (kg, kg*m2) least inertia along and about an axis that is not rounding
  * in  U[21] upper triangle, row by row: S = U^T U
- * in  d[6] load that rows take: f = U^T (U a + d) + e
+ * in  d[6] load in the rows: f = U^T (U a + d) + e
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  tau[3] (N, N*m) efforts on the free coordinates
  * out G[3][6] udot = g - G a_Q
  * out g[3] udot = g - G a_Q
- * out V[21] upper triangle of what is behind the hinge
- * out d_V[6] load that its rows take
- * out e_Q[6] (N, N*m) load that they do not take
+ * out V[21] upper triangle outboard of the hinge
+ * out d_V[6] load in its rows
+ * out e_Q[6] (N, N*m) load outside the rows
  */
 int mstmm_sweep_generic3_qr_eliminate(const real *restrict H, const real *restrict J,
     const real *restrict floor_, const real *restrict U, const real *restrict d,
@@ -4835,14 +4835,14 @@ static const mstmm_port mstmm_sweep_generic3_tangent_carrier_outputs[] = {
 /* a direction of a hinge with 3 speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  theta[3] turn of the body along the direction, body axes
- * in  x[3] change of place of P along the direction, body axes
+ * in  theta[3] rotation of the body along the direction, body axes
+ * in  x[3] displacement of P along the direction, body axes
  * in  H[6][3]
  * in  s[3]
  * in  v[3]
  * in  w[3]
  * in  Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
- * in  f[6] (N, N*m) load at P that is carried
+ * in  f[6] (N, N*m) carried load at P
  * in  d_H[6][3]
  * in  d_v[3]
  * in  d_w[3]
@@ -4851,7 +4851,7 @@ static const mstmm_port mstmm_sweep_generic3_tangent_carrier_outputs[] = {
  * in  J[3] (kg*m2 or kg) rotor inertia reflected to the speeds
  * in  laws[3] change of the laws' efforts
  * out B[9] motion along the direction
- * out G[6] change of the load that is carried
+ * out G[6] change of the carried load
  * out row[3] change of the rows by load, rotors and laws
  */
 int mstmm_sweep_generic3_tangent_column(const real *restrict theta, const real *restrict x,
@@ -5182,13 +5182,13 @@ static const mstmm_port mstmm_sweep_generic3_tangent_column_outputs[] = {
     {"row", 3, "", 0, 0},
 };
 
-/* turn and change of place along coordinates of a hinge with 3 free speeds
+/* rotation and displacement along coordinates of a hinge with 3 free speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  H[6][3]
  * in  d_q[3]
- * out theta[3] turn of the body along the direction, body axes
- * out x[3] change of place of P along the direction, body axes
+ * out theta[3] rotation of the body along the direction, body axes
+ * out x[3] displacement of P along the direction, body axes
  */
 int mstmm_sweep_generic3_tangent_along(const real *restrict H, const real *restrict d_q,
     real *restrict theta, real *restrict x)
@@ -5251,19 +5251,19 @@ static const mstmm_port mstmm_sweep_generic3_tangent_along_outputs[] = {
 /* a direction of a hinge with 3 free speeds, whose subspace is constant
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  theta[3] turn of the body along the direction, body axes
- * in  x[3] change of place of P along the direction, body axes
+ * in  theta[3] rotation of the body along the direction, body axes
+ * in  x[3] displacement of P along the direction, body axes
  * in  H[6][3]
  * in  v[3]
  * in  w[3]
  * in  Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
- * in  f[6] (N, N*m) load at P that is carried
+ * in  f[6] (N, N*m) carried load at P
  * in  d_u[3]
  * in  d_s[3]
  * in  J[3] (kg*m2 or kg) rotor inertia reflected to the speeds
  * in  laws[3] change of the laws' efforts
  * out B[9] motion along the direction
- * out G[6] change of the load that is carried
+ * out G[6] change of the carried load
  * out row[3] change of the rows by load, rotors and laws
  */
 int mstmm_sweep_generic3_tangent_steady(const real *restrict theta, const real *restrict x,
@@ -5565,20 +5565,20 @@ static const mstmm_port mstmm_sweep_generic3_tangent_steady_outputs[] = {
     {"row", 3, "", 0, 0},
 };
 
-/* a direction of a hinge with 3 free speeds, which turns about constant axes
+/* a direction of a hinge with 3 free speeds, which rotates about constant axes
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  theta[3] turn of the body along the direction, body axes
+ * in  theta[3] rotation of the body along the direction, body axes
  * in  H[6][3]
  * in  w[3]
  * in  Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
- * in  f[6] (N, N*m) load at P that is carried
+ * in  f[6] (N, N*m) carried load at P
  * in  d_u[3]
  * in  d_s[3]
  * in  J[3] (kg*m2 or kg) rotor inertia reflected to the speeds
  * in  laws[3] change of the laws' efforts
  * out B[9] motion along the direction
- * out G[6] change of the load that is carried
+ * out G[6] change of the carried load
  * out row[3] change of the rows by load, rotors and laws
  */
 int mstmm_sweep_generic3_tangent_turning(const real *restrict theta, const real *restrict H,
@@ -5747,9 +5747,9 @@ static const mstmm_port mstmm_sweep_generic3_tangent_turning_outputs[] = {
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  H[6][3] motion subspace of the unknowns
  * in  B[3][9] motion along the unknowns
- * in  W[3][3] slopes of the rows, a row a direction
- * in  S[9][6] change of the load by that of the motion, a row an entry
- * out K[3][6] S B, a row a direction
+ * in  W[3][3] derivatives of the rows, one row per direction
+ * in  S[9][6] change of the load by that of the motion, one row per entry
+ * out K[3][6] S B, one row per direction
  * out right[3][9] rows by the motion
  * out D[3][3] rows by unknowns
  * out one[3][3] unit matrix
@@ -6021,11 +6021,11 @@ static const mstmm_port mstmm_sweep_generic3_tangent_rows_outputs[] = {
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  inverse[3][3] D^-1
  * in  right[3][9] rows by the motion
- * in  K[3][6] S B, a row a direction
- * in  G[3][6] change of the load that is carried
+ * in  K[3][6] S B, one row per direction
+ * in  G[3][6] change of the carried load
  * out gain[3][9] D^-1 times the rows by the motion
- * out V[3][6] K + G, a row a direction
- * out S[9][6] change of the load by that of the motion, a row an entry, added to what is there
+ * out V[3][6] K + G, one row per direction
+ * out S[9][6] change of the load by that of the motion, one row per entry, added to what is there
  */
 int mstmm_sweep_generic3_tangent_reduce(const real *restrict inverse, const real *restrict right,
     const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
@@ -6155,11 +6155,11 @@ static const mstmm_port mstmm_sweep_generic3_tangent_reduce_outputs[] = {
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][3] motion subspace of the unknowns
- * in  V[3][6] K + G, a row a direction
+ * in  V[3][6] K + G, one row per direction
  * in  inverse[3][3] D^-1
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  e_f[3] load of the rows
- * out y[3] D^-1 times what is left of the rows
+ * out y[3] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
 int mstmm_sweep_generic3_tangent_push(const real *restrict Rc, const real *restrict r,
@@ -6364,7 +6364,7 @@ static const mstmm_port mstmm_sweep_generic3_tangent_push_outputs[] = {
     {"e_I", 6, "N, N*m", 1, 0},
 };
 
-/* unknowns of a hinge with 3 free speeds that answer a right-hand side
+/* solution of a hinge with 3 free speeds for a right-hand side
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -6375,7 +6375,7 @@ static const mstmm_port mstmm_sweep_generic3_tangent_push_outputs[] = {
  * in  z_I[9] change of the parent's motion, parent axes
  * in  B[3][9] motion along the unknowns
  * in  gain[3][9] D^-1 times the rows by the motion
- * in  y[3] D^-1 times what is left of the rows
+ * in  y[3] D^-1 times the remainder of the rows
  * out x[3] unknowns
  * out z[9] change of the body's motion, own axes
  */
@@ -6656,18 +6656,18 @@ static const mstmm_port mstmm_sweep_generic3_tangent_answer_outputs[] = {
     {"z", 9, "", 0, 0},
 };
 
-/* a right-hand side carried across a hinge with 3 free speeds and increments that are known
+/* a right-hand side carried across a hinge with 3 free speeds and known increments
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][3] motion subspace of the unknowns
- * in  V[3][6] K + G, a row a direction
+ * in  V[3][6] K + G, one row per direction
  * in  inverse[3][3] D^-1
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  e_f[3] load of the rows
- * in  e_b[6] (N, N*m) load by what is known, without the unknowns
- * out y[3] D^-1 times what is left of the rows
+ * in  e_b[6] (N, N*m) load due to known increments, without the unknowns
+ * out y[3] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
 int mstmm_sweep_generic3_tangent_push_known(const real *restrict Rc, const real *restrict r,
@@ -6880,7 +6880,7 @@ static const mstmm_port mstmm_sweep_generic3_tangent_push_known_outputs[] = {
     {"e_I", 6, "N, N*m", 1, 0},
 };
 
-/* unknowns of a hinge with 3 free speeds that answer a right-hand side and increments that are known
+/* solution of a hinge with 3 free speeds for a right-hand side and known increments
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -6891,8 +6891,8 @@ static const mstmm_port mstmm_sweep_generic3_tangent_push_known_outputs[] = {
  * in  z_I[9] change of the parent's motion, parent axes
  * in  B[3][9] motion along the unknowns
  * in  gain[3][9] D^-1 times the rows by the motion
- * in  y[3] D^-1 times what is left of the rows
- * in  b[9] change of motion that is known
+ * in  y[3] D^-1 times the remainder of the rows
+ * in  b[9] known change of motion
  * out x[3] unknowns
  * out z[9] change of the body's motion, own axes
  */
@@ -7183,10 +7183,10 @@ static const mstmm_port mstmm_sweep_generic3_tangent_answer_known_outputs[] = {
     {"z", 9, "", 0, 0},
 };
 
-/* what a hinge with 3 speeds lets go and holds
+/* free and constrained directions of a hinge with 3 speeds
  * source: Householder, J. ACM 5 (1958) 339-342 (reflections)
  * in  H[6][3] motion subspace
- * out W[6][6] rows: H^+, then what the hinge holds
+ * out W[6][6] rows: H^+, then the constrained directions
  */
 int mstmm_sweep_generic3_complement(const real *restrict H, real *restrict W)
 {
@@ -7750,7 +7750,7 @@ static const mstmm_port mstmm_sweep_generic3_couple_outputs[] = {
     {"L_ij", 1, "", 1, 0},
 };
 
-/* what a hinge with 3 speeds tells a row
+/* contribution of a hinge with 3 speeds to a row
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  y[3] tau - H^T e
@@ -7784,7 +7784,7 @@ static const mstmm_port mstmm_sweep_generic3_answered_outputs[] = {
     {"l", 1, "", 1, 0},
 };
 
-/* a multiplier felt by a hinge with 3 speeds
+/* contribution of a multiplier to a hinge with 3 speeds
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  y[3] of the row
@@ -7817,7 +7817,7 @@ static const mstmm_port mstmm_sweep_generic3_pull_outputs[] = {
     {"y_0", 3, "", 1, 0},
 };
 
-/* load of what a hinge with 3 speeds accelerates
+/* load of the bodies accelerated by a hinge with 3 speeds
  * in  S[21] inertia of everything outboard, at P
  * in  H[6][3] motion subspace
  * in  udot[3] accelerations of the coordinates
@@ -8079,12 +8079,12 @@ static const mstmm_port mstmm_sweep_generic3_exerted_outputs[] = {
     {"e", 6, "N, N*m", 0, 0},
 };
 
-/* load of a column felt by a hinge on the ground with 3 free speeds
+/* load of a right-hand side along a hinge on the ground with 3 free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  H[6][3] motion subspace of the free coordinates
  * in  e[6] (N, N*m) force part of f = S a + e, at P
- * in  tau[3] (N, N*m) the column's efforts on the free coordinates
+ * in  tau[3] (N, N*m) efforts of the right-hand side on the free coordinates
  * out y[3] (N, N*m) tau - H^T e
  */
 int mstmm_sweep_generic3_push_on_ground(const real *restrict H, const real *restrict e,
@@ -10123,7 +10123,7 @@ static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic3_forward_inputs,
         .outputs = mstmm_sweep_generic3_forward_outputs,
-        .ir_hash = "bed1c56fe2e8db6feb2804594a7bce8295c02aa8ca19b66ad9c40b6e6dd08641",
+        .ir_hash = "c095eb3c76b3ee8d498892e71ab273478e8782cf2ba90c40fdb314e974b2ab13",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -10183,7 +10183,7 @@ static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic3_factor_inputs,
         .outputs = mstmm_sweep_generic3_factor_outputs,
-        .ir_hash = "a927d5cb0548fb97d755a2da6898c70a4cd804b1b528f1705bca84f7ee68b8e9",
+        .ir_hash = "1788eb0da328c2eb36189dfe3656b5664c3c7b072f4783c5c94a2ede30c15f22",
         .n_guards = 6,
         .guards = mstmm_sweep_generic3_factor_guards,
     },
@@ -10195,7 +10195,7 @@ static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic3_push_inputs,
         .outputs = mstmm_sweep_generic3_push_outputs,
-        .ir_hash = "2ceca546ce5e98c5fac946caeb87c84bc4b86630841235af9c58507bf15c7d15",
+        .ir_hash = "5aadfe88faa405b6f781fead0fa0db915cc94ce0720c59e4b51eed4bca333118",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -10207,7 +10207,7 @@ static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic3_answer_inputs,
         .outputs = mstmm_sweep_generic3_answer_outputs,
-        .ir_hash = "0fbf825da4788bcdddbc1a20411ba97a2901bc8ad78b8226b71e6ec376a5d221",
+        .ir_hash = "b5ac799ad6fe0318c2a301ad33893871942fa3f4f79613f42d2c0b12157e0f2b",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -10219,7 +10219,7 @@ static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
         .n_outputs = 5,
         .inputs = mstmm_sweep_generic3_qr_eliminate_inputs,
         .outputs = mstmm_sweep_generic3_qr_eliminate_outputs,
-        .ir_hash = "aca66d265c71b4ed0a34bbe407c7b1a8fbea986fce6d9c4dc8ed1fe2e2b8a5ad",
+        .ir_hash = "7a2f62c041ff19f60418a9ac81eadd459e128fc35b0710b60a8f5d632c7c9876",
         .n_guards = 6,
         .guards = mstmm_sweep_generic3_qr_eliminate_guards,
     },
@@ -10243,7 +10243,7 @@ static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic3_tangent_column_inputs,
         .outputs = mstmm_sweep_generic3_tangent_column_outputs,
-        .ir_hash = "1301914cdf7d76eb95aeec3c3011d7c5a183fad636ff602c3c57c657c1c2ff67",
+        .ir_hash = "04c2cc157223ed30b9bb19d2702ad4d0648c0fa26fe385bbcace50bf54c20663",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -10255,7 +10255,7 @@ static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic3_tangent_along_inputs,
         .outputs = mstmm_sweep_generic3_tangent_along_outputs,
-        .ir_hash = "4741fab1c15fda1b1d563ee3da440c28d8f4e541f1e352a62fb62cb99a0773e4",
+        .ir_hash = "ee51d5229d624d5b1f2598519ecc7c490cd8ad53eda81b2c40e1945f37cada5c",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -10267,7 +10267,7 @@ static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic3_tangent_steady_inputs,
         .outputs = mstmm_sweep_generic3_tangent_steady_outputs,
-        .ir_hash = "f90c746e81a2eadc0bea49b2a33c1b8b3396c0a1319dd5b611464ef516338202",
+        .ir_hash = "1a9b4917617fb6dca21551e642553a194a5e56b6854e8c210029289327e162b2",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -10279,7 +10279,7 @@ static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic3_tangent_turning_inputs,
         .outputs = mstmm_sweep_generic3_tangent_turning_outputs,
-        .ir_hash = "d60bed55d7ae0b9ec7edd229e5f5014309e4ff962c2ffb0bf4b35e43620283c5",
+        .ir_hash = "8bd59e73193b9bf1b8af56f274afb8c83ed890b733029352caf53626b20cd9c7",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -10291,7 +10291,7 @@ static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_sweep_generic3_tangent_rows_inputs,
         .outputs = mstmm_sweep_generic3_tangent_rows_outputs,
-        .ir_hash = "0a1a0190fbc29c67175c79f2b2e191590490d2cf77a4782ba2f2b9b9e17e267e",
+        .ir_hash = "719ae65ebb96acbd94d12a13f9fe75b13c3c782195e517dd4f345796e088be2c",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -10303,7 +10303,7 @@ static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic3_tangent_reduce_inputs,
         .outputs = mstmm_sweep_generic3_tangent_reduce_outputs,
-        .ir_hash = "3d1a65009d43524312057b02773ce0ff2750e79b55e329bbaab2ee32af857eec",
+        .ir_hash = "7165a7823606a1374f89a4d36aab18d31c50f854f42b2d53ca9153a0b5c76ace",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -10315,7 +10315,7 @@ static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic3_tangent_push_inputs,
         .outputs = mstmm_sweep_generic3_tangent_push_outputs,
-        .ir_hash = "9d01cfeff5963f0ea5e153acff2e2c9e3c942b5804a8e386e253464965126a51",
+        .ir_hash = "844b92777f3c34bf7cca9d250991f41f2ad229042010fcb303a7d233631ebd56",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -10327,7 +10327,7 @@ static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic3_tangent_answer_inputs,
         .outputs = mstmm_sweep_generic3_tangent_answer_outputs,
-        .ir_hash = "b49a170586f2e3b57ab30615d197f6e963404b94688db12cdaa45b531d0eb681",
+        .ir_hash = "5b19c8b68d968d1fd135d67a29a5bb7365aecad9c8b24320d4f22cc985584e1d",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -10339,7 +10339,7 @@ static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic3_tangent_push_known_inputs,
         .outputs = mstmm_sweep_generic3_tangent_push_known_outputs,
-        .ir_hash = "a4ee9b216e54c72d359d2c280d60a1b8fd5b9679976db3c99d9af2c416d3ab2c",
+        .ir_hash = "f83148ac1bce6a17d39f668f8df35d3c0949bbd347548ee478eaee990fdc2fcb",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -10351,7 +10351,7 @@ static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic3_tangent_answer_known_inputs,
         .outputs = mstmm_sweep_generic3_tangent_answer_known_outputs,
-        .ir_hash = "b0d54c31b26ea4be0cd6f9eddcdb5c39aa5880e07efdaa38030981410b0958a7",
+        .ir_hash = "3577984e024189bdbafb9230c33e61b95fc88ae79ce17b46e7a0e3bd5e1facaf",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -10363,7 +10363,7 @@ static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_generic3_complement_inputs,
         .outputs = mstmm_sweep_generic3_complement_outputs,
-        .ir_hash = "b6f1d188f1aa26501743a0ecf7e3e2adeb6c64d17b49de2eca98a071a09f48a9",
+        .ir_hash = "313ee53947d1877f1c8d37170e5533286b45533fdaf648f532bcc30ee17c4634",
         .n_guards = 3,
         .guards = mstmm_sweep_generic3_complement_guards,
     },
@@ -10399,7 +10399,7 @@ static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_generic3_answered_inputs,
         .outputs = mstmm_sweep_generic3_answered_outputs,
-        .ir_hash = "79de1c0abeb4998671e6aa6dd136b089367afc631d1c1ab831870d4820a82fa6",
+        .ir_hash = "765b07c19ad41b6649c541995b9cebcb414646d1972a5b7c86773d043094a1d5",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -10411,7 +10411,7 @@ static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_generic3_pull_inputs,
         .outputs = mstmm_sweep_generic3_pull_outputs,
-        .ir_hash = "0a2e11103bb6e482c6546f1223d6f80c175283a0838b7d12864248427a961772",
+        .ir_hash = "e2623c8ae511bc57510595d0dd228d7073426d8368a02bd5ca40b0e82819885a",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -10423,7 +10423,7 @@ static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_generic3_exerted_inputs,
         .outputs = mstmm_sweep_generic3_exerted_outputs,
-        .ir_hash = "c0b58e2f1ee79d14bce881d1051640cc2537ecc81263bb29d97ef12a79d9aa23",
+        .ir_hash = "94fa766d98029fb8be4c5b7c8c1fc9ba57204de1c0c082525b337a941a90706e",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -10435,7 +10435,7 @@ static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_generic3_push_on_ground_inputs,
         .outputs = mstmm_sweep_generic3_push_on_ground_outputs,
-        .ir_hash = "c46643698853759fee5f8748093553742aa12ebce61e84a2eb9035a296d4b81c",
+        .ir_hash = "c8a35d332a8a2d6731c5bef35a1704f1b78afbc8fe9f9e31f903da5b63536be3",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -10505,7 +10505,7 @@ const mstmm_element mstmm_sweep_generic3 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic3",
-    .hash = "935b2ce9e7daf421adf11247325e678133fefbdac4e3c3c46df6215397db655b",
+    .hash = "64cbb3f48f92862129cfa030b187017c6294d2f78326d65be140bc6863c0d4ea",
     .nq = 0,
     .nu = 0,
     .np = 0,

@@ -108,7 +108,7 @@ int mstmm_sweep_generic4_pull_slope(const real *restrict y, const real *restrict
 
 #ifndef MSTMM_TWO
 #define MSTMM_TWO
-/* Two numbers at a time, in a register and in an array. */
+/* Pairs of numbers, in a register and in an array. */
 typedef real two_t __attribute__((vector_size(2 * sizeof(real))));
 typedef real two_free_t __attribute__((vector_size(2 * sizeof(real)), aligned(sizeof(real)), may_alias));
 
@@ -123,7 +123,7 @@ static inline __attribute__((always_inline, unused)) two_t mstmm_apart(const rea
 }
 #endif
 
-/* bias motion behind a hinge with 4 speeds
+/* bias motion outboard of a hinge with 4 speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rt[3][3] rotation, inboard hinge axes to parent axes
@@ -2471,7 +2471,7 @@ static const mstmm_guard mstmm_sweep_generic4_project_guards[] = {
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][4] motion subspace of the free coordinates
  * in  J[4] (kg*m2 or kg) rotor inertia reflected to the speeds
- * in  W[4][4] change of the efforts of laws, a row a speed
+ * in  W[4][4] change of the efforts of laws, one row per speed
  * in  floor[2] (kg, kg*m2) least inertia along and about an axis that is not rounding
  * in  S[21] f = S a + e of everything outboard, at P
  * out F[4][4] D = L diag(d) L^T: L, and 1 / d on the diagonal
@@ -3748,7 +3748,7 @@ static const mstmm_guard mstmm_sweep_generic4_factor_guards[] = {
     {1, "speed 4 of 4 moves no inertia: its acceleration is undetermined"},
 };
 
-/* load of a column carried across a hinge with 4 free speeds
+/* load of a right-hand side carried across a hinge with 4 free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -3756,7 +3756,7 @@ static const mstmm_guard mstmm_sweep_generic4_factor_guards[] = {
  * in  H[6][4] motion subspace of the free coordinates
  * in  G[4][6] D^-1 H^T S
  * in  e[6] (N, N*m) force part of f = S a + e, at P
- * in  tau[4] (N, N*m) the column's efforts on the free coordinates
+ * in  tau[4] (N, N*m) efforts of the right-hand side on the free coordinates
  * out y[4] (N, N*m) tau - H^T e
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
@@ -3968,7 +3968,7 @@ static const mstmm_port mstmm_sweep_generic4_push_outputs[] = {
     {"e_I", 6, "N, N*m", 1, 0},
 };
 
-/* accelerations that answer a column, across a hinge with 4 free speeds
+/* accelerations due to a right-hand side, across a hinge with 4 free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -4185,7 +4185,7 @@ static const mstmm_port mstmm_sweep_generic4_answer_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
-/* rows behind a hinge with 4 free speeds
+/* rows outboard of a hinge with 4 free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * source: Gauss, J. reine angew. Math. 4 (1829) 232-235 (least constraint)
@@ -4194,14 +4194,14 @@ static const mstmm_port mstmm_sweep_generic4_answer_outputs[] = {
  * in  J[4] (kg*m2 or kg) rotor inertia reflected to the speeds
  * in  floor[2] (kg, kg*m2) least inertia along and about an axis that is not rounding
  * in  U[21] upper triangle, row by row: S = U^T U
- * in  d[6] load that rows take: f = U^T (U a + d) + e
+ * in  d[6] load in the rows: f = U^T (U a + d) + e
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  tau[4] (N, N*m) efforts on the free coordinates
  * out G[4][6] udot = g - G a_Q
  * out g[4] udot = g - G a_Q
- * out V[21] upper triangle of what is behind the hinge
- * out d_V[6] load that its rows take
- * out e_Q[6] (N, N*m) load that they do not take
+ * out V[21] upper triangle outboard of the hinge
+ * out d_V[6] load in its rows
+ * out e_Q[6] (N, N*m) load outside the rows
  */
 int mstmm_sweep_generic4_qr_eliminate(const real *restrict H, const real *restrict J,
     const real *restrict floor_, const real *restrict U, const real *restrict d,
@@ -6097,14 +6097,14 @@ static const mstmm_port mstmm_sweep_generic4_tangent_carrier_outputs[] = {
 /* a direction of a hinge with 4 speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  theta[3] turn of the body along the direction, body axes
- * in  x[3] change of place of P along the direction, body axes
+ * in  theta[3] rotation of the body along the direction, body axes
+ * in  x[3] displacement of P along the direction, body axes
  * in  H[6][4]
  * in  s[4]
  * in  v[3]
  * in  w[3]
  * in  Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
- * in  f[6] (N, N*m) load at P that is carried
+ * in  f[6] (N, N*m) carried load at P
  * in  d_H[6][4]
  * in  d_v[3]
  * in  d_w[3]
@@ -6113,7 +6113,7 @@ static const mstmm_port mstmm_sweep_generic4_tangent_carrier_outputs[] = {
  * in  J[4] (kg*m2 or kg) rotor inertia reflected to the speeds
  * in  laws[4] change of the laws' efforts
  * out B[9] motion along the direction
- * out G[6] change of the load that is carried
+ * out G[6] change of the carried load
  * out row[4] change of the rows by load, rotors and laws
  */
 int mstmm_sweep_generic4_tangent_column(const real *restrict theta, const real *restrict x,
@@ -6483,13 +6483,13 @@ static const mstmm_port mstmm_sweep_generic4_tangent_column_outputs[] = {
     {"row", 4, "", 0, 0},
 };
 
-/* turn and change of place along coordinates of a hinge with 4 free speeds
+/* rotation and displacement along coordinates of a hinge with 4 free speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  H[6][4]
  * in  d_q[4]
- * out theta[3] turn of the body along the direction, body axes
- * out x[3] change of place of P along the direction, body axes
+ * out theta[3] rotation of the body along the direction, body axes
+ * out x[3] displacement of P along the direction, body axes
  */
 int mstmm_sweep_generic4_tangent_along(const real *restrict H, const real *restrict d_q,
     real *restrict theta, real *restrict x)
@@ -6564,19 +6564,19 @@ static const mstmm_port mstmm_sweep_generic4_tangent_along_outputs[] = {
 /* a direction of a hinge with 4 free speeds, whose subspace is constant
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  theta[3] turn of the body along the direction, body axes
- * in  x[3] change of place of P along the direction, body axes
+ * in  theta[3] rotation of the body along the direction, body axes
+ * in  x[3] displacement of P along the direction, body axes
  * in  H[6][4]
  * in  v[3]
  * in  w[3]
  * in  Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
- * in  f[6] (N, N*m) load at P that is carried
+ * in  f[6] (N, N*m) carried load at P
  * in  d_u[4]
  * in  d_s[4]
  * in  J[4] (kg*m2 or kg) rotor inertia reflected to the speeds
  * in  laws[4] change of the laws' efforts
  * out B[9] motion along the direction
- * out G[6] change of the load that is carried
+ * out G[6] change of the carried load
  * out row[4] change of the rows by load, rotors and laws
  */
 int mstmm_sweep_generic4_tangent_steady(const real *restrict theta, const real *restrict x,
@@ -6905,20 +6905,20 @@ static const mstmm_port mstmm_sweep_generic4_tangent_steady_outputs[] = {
     {"row", 4, "", 0, 0},
 };
 
-/* a direction of a hinge with 4 free speeds, which turns about constant axes
+/* a direction of a hinge with 4 free speeds, which rotates about constant axes
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  theta[3] turn of the body along the direction, body axes
+ * in  theta[3] rotation of the body along the direction, body axes
  * in  H[6][4]
  * in  w[3]
  * in  Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
- * in  f[6] (N, N*m) load at P that is carried
+ * in  f[6] (N, N*m) carried load at P
  * in  d_u[4]
  * in  d_s[4]
  * in  J[4] (kg*m2 or kg) rotor inertia reflected to the speeds
  * in  laws[4] change of the laws' efforts
  * out B[9] motion along the direction
- * out G[6] change of the load that is carried
+ * out G[6] change of the carried load
  * out row[4] change of the rows by load, rotors and laws
  */
 int mstmm_sweep_generic4_tangent_turning(const real *restrict theta, const real *restrict H,
@@ -7102,9 +7102,9 @@ static const mstmm_port mstmm_sweep_generic4_tangent_turning_outputs[] = {
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  H[6][4] motion subspace of the unknowns
  * in  B[4][9] motion along the unknowns
- * in  W[4][4] slopes of the rows, a row a direction
- * in  S[9][6] change of the load by that of the motion, a row an entry
- * out K[4][6] S B, a row a direction
+ * in  W[4][4] derivatives of the rows, one row per direction
+ * in  S[9][6] change of the load by that of the motion, one row per entry
+ * out K[4][6] S B, one row per direction
  * out right[4][9] rows by the motion
  * out D[4][4] rows by unknowns
  * out one[4][4] unit matrix
@@ -7504,11 +7504,11 @@ static const mstmm_port mstmm_sweep_generic4_tangent_rows_outputs[] = {
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  inverse[4][4] D^-1
  * in  right[4][9] rows by the motion
- * in  K[4][6] S B, a row a direction
- * in  G[4][6] change of the load that is carried
+ * in  K[4][6] S B, one row per direction
+ * in  G[4][6] change of the carried load
  * out gain[4][9] D^-1 times the rows by the motion
- * out V[4][6] K + G, a row a direction
- * out S[9][6] change of the load by that of the motion, a row an entry, added to what is there
+ * out V[4][6] K + G, one row per direction
+ * out S[9][6] change of the load by that of the motion, one row per entry, added to what is there
  */
 int mstmm_sweep_generic4_tangent_reduce(const real *restrict inverse, const real *restrict right,
     const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
@@ -7676,11 +7676,11 @@ static const mstmm_port mstmm_sweep_generic4_tangent_reduce_outputs[] = {
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][4] motion subspace of the unknowns
- * in  V[4][6] K + G, a row a direction
+ * in  V[4][6] K + G, one row per direction
  * in  inverse[4][4] D^-1
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  e_f[4] load of the rows
- * out y[4] D^-1 times what is left of the rows
+ * out y[4] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
 int mstmm_sweep_generic4_tangent_push(const real *restrict Rc, const real *restrict r,
@@ -7924,7 +7924,7 @@ static const mstmm_port mstmm_sweep_generic4_tangent_push_outputs[] = {
     {"e_I", 6, "N, N*m", 1, 0},
 };
 
-/* unknowns of a hinge with 4 free speeds that answer a right-hand side
+/* solution of a hinge with 4 free speeds for a right-hand side
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -7935,7 +7935,7 @@ static const mstmm_port mstmm_sweep_generic4_tangent_push_outputs[] = {
  * in  z_I[9] change of the parent's motion, parent axes
  * in  B[4][9] motion along the unknowns
  * in  gain[4][9] D^-1 times the rows by the motion
- * in  y[4] D^-1 times what is left of the rows
+ * in  y[4] D^-1 times the remainder of the rows
  * out x[4] unknowns
  * out z[9] change of the body's motion, own axes
  */
@@ -8253,18 +8253,18 @@ static const mstmm_port mstmm_sweep_generic4_tangent_answer_outputs[] = {
     {"z", 9, "", 0, 0},
 };
 
-/* a right-hand side carried across a hinge with 4 free speeds and increments that are known
+/* a right-hand side carried across a hinge with 4 free speeds and known increments
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][4] motion subspace of the unknowns
- * in  V[4][6] K + G, a row a direction
+ * in  V[4][6] K + G, one row per direction
  * in  inverse[4][4] D^-1
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  e_f[4] load of the rows
- * in  e_b[6] (N, N*m) load by what is known, without the unknowns
- * out y[4] D^-1 times what is left of the rows
+ * in  e_b[6] (N, N*m) load due to known increments, without the unknowns
+ * out y[4] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
 int mstmm_sweep_generic4_tangent_push_known(const real *restrict Rc, const real *restrict r,
@@ -8516,7 +8516,7 @@ static const mstmm_port mstmm_sweep_generic4_tangent_push_known_outputs[] = {
     {"e_I", 6, "N, N*m", 1, 0},
 };
 
-/* unknowns of a hinge with 4 free speeds that answer a right-hand side and increments that are known
+/* solution of a hinge with 4 free speeds for a right-hand side and known increments
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -8527,8 +8527,8 @@ static const mstmm_port mstmm_sweep_generic4_tangent_push_known_outputs[] = {
  * in  z_I[9] change of the parent's motion, parent axes
  * in  B[4][9] motion along the unknowns
  * in  gain[4][9] D^-1 times the rows by the motion
- * in  y[4] D^-1 times what is left of the rows
- * in  b[9] change of motion that is known
+ * in  y[4] D^-1 times the remainder of the rows
+ * in  b[9] known change of motion
  * out x[4] unknowns
  * out z[9] change of the body's motion, own axes
  */
@@ -8856,10 +8856,10 @@ static const mstmm_port mstmm_sweep_generic4_tangent_answer_known_outputs[] = {
     {"z", 9, "", 0, 0},
 };
 
-/* what a hinge with 4 speeds lets go and holds
+/* free and constrained directions of a hinge with 4 speeds
  * source: Householder, J. ACM 5 (1958) 339-342 (reflections)
  * in  H[6][4] motion subspace
- * out W[6][6] rows: H^+, then what the hinge holds
+ * out W[6][6] rows: H^+, then the constrained directions
  */
 int mstmm_sweep_generic4_complement(const real *restrict H, real *restrict W)
 {
@@ -9623,7 +9623,7 @@ static const mstmm_port mstmm_sweep_generic4_couple_outputs[] = {
     {"L_ij", 1, "", 1, 0},
 };
 
-/* what a hinge with 4 speeds tells a row
+/* contribution of a hinge with 4 speeds to a row
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  y[4] tau - H^T e
@@ -9659,7 +9659,7 @@ static const mstmm_port mstmm_sweep_generic4_answered_outputs[] = {
     {"l", 1, "", 1, 0},
 };
 
-/* a multiplier felt by a hinge with 4 speeds
+/* contribution of a multiplier to a hinge with 4 speeds
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  y[4] of the row
@@ -9694,7 +9694,7 @@ static const mstmm_port mstmm_sweep_generic4_pull_outputs[] = {
     {"y_0", 4, "", 1, 0},
 };
 
-/* load of what a hinge with 4 speeds accelerates
+/* load of the bodies accelerated by a hinge with 4 speeds
  * in  S[21] inertia of everything outboard, at P
  * in  H[6][4] motion subspace
  * in  udot[4] accelerations of the coordinates
@@ -10034,12 +10034,12 @@ static const mstmm_port mstmm_sweep_generic4_exerted_outputs[] = {
     {"e", 6, "N, N*m", 0, 0},
 };
 
-/* load of a column felt by a hinge on the ground with 4 free speeds
+/* load of a right-hand side along a hinge on the ground with 4 free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  H[6][4] motion subspace of the free coordinates
  * in  e[6] (N, N*m) force part of f = S a + e, at P
- * in  tau[4] (N, N*m) the column's efforts on the free coordinates
+ * in  tau[4] (N, N*m) efforts of the right-hand side on the free coordinates
  * out y[4] (N, N*m) tau - H^T e
  */
 int mstmm_sweep_generic4_push_on_ground(const real *restrict H, const real *restrict e,
@@ -12691,7 +12691,7 @@ static const mstmm_kernel mstmm_sweep_generic4_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic4_forward_inputs,
         .outputs = mstmm_sweep_generic4_forward_outputs,
-        .ir_hash = "6cba70f3176267926bd86b284d2f0e47c6ae8197d4ea19ea7be58f5faea8efb8",
+        .ir_hash = "cc41e1c59a046592b3e7df4e8d6c78dc0c762877710b9a3dcf2e783e3095a0d7",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -12751,7 +12751,7 @@ static const mstmm_kernel mstmm_sweep_generic4_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic4_factor_inputs,
         .outputs = mstmm_sweep_generic4_factor_outputs,
-        .ir_hash = "308eb74a54f0c56b4dd30fcb8046702eeb96d44fe35ec334ecd8ed0850aa2409",
+        .ir_hash = "565f2506ff9664282161146c2231e6fab4e18663a4251790a90f34504f77b160",
         .n_guards = 8,
         .guards = mstmm_sweep_generic4_factor_guards,
     },
@@ -12763,7 +12763,7 @@ static const mstmm_kernel mstmm_sweep_generic4_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic4_push_inputs,
         .outputs = mstmm_sweep_generic4_push_outputs,
-        .ir_hash = "eeb80af44702dd3d6a4b2c6e17bf458a7d93bfba49148a7662776e3bd6cd881d",
+        .ir_hash = "98ac227bb9a1c7e73eeb2b183e17d971a31359bad8bdbf23abd96821748bca7d",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -12775,7 +12775,7 @@ static const mstmm_kernel mstmm_sweep_generic4_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic4_answer_inputs,
         .outputs = mstmm_sweep_generic4_answer_outputs,
-        .ir_hash = "175870d92e9ceb8da005ff86d5069fd699e2a7a8493dc7a946c3f35ac6f9a28f",
+        .ir_hash = "d5db93961b304f91f21a930806ce44c3354e63cc50cb5ba7dd9b67e04257c6fc",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -12787,7 +12787,7 @@ static const mstmm_kernel mstmm_sweep_generic4_kernels[] = {
         .n_outputs = 5,
         .inputs = mstmm_sweep_generic4_qr_eliminate_inputs,
         .outputs = mstmm_sweep_generic4_qr_eliminate_outputs,
-        .ir_hash = "4351eabcaf0313cdfd94a8a1fa3deff934d647c644c49b4da600462147a3d6c3",
+        .ir_hash = "4391442b2a4276818b1569c0eaf5f1c73a79eaed2b596fc2ea657e746b202c90",
         .n_guards = 8,
         .guards = mstmm_sweep_generic4_qr_eliminate_guards,
     },
@@ -12811,7 +12811,7 @@ static const mstmm_kernel mstmm_sweep_generic4_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic4_tangent_column_inputs,
         .outputs = mstmm_sweep_generic4_tangent_column_outputs,
-        .ir_hash = "45c1305dac3cc0b3b9ad63787b792947714af7c8bb5152bbd1f7a21eeeff8234",
+        .ir_hash = "4f04ea6e9bd4a37cffbacfafae8d6162fc6e82ec033f9e5782080c6e8e245d8f",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -12823,7 +12823,7 @@ static const mstmm_kernel mstmm_sweep_generic4_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic4_tangent_along_inputs,
         .outputs = mstmm_sweep_generic4_tangent_along_outputs,
-        .ir_hash = "9149ab7186a3a273d2d7c7f498f50e113970b46d41a328e195da36ac165374f5",
+        .ir_hash = "a4395210a05ea9574e46ce74ae8938d103a0acd2e380a5abbae0f10803b44846",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -12835,7 +12835,7 @@ static const mstmm_kernel mstmm_sweep_generic4_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic4_tangent_steady_inputs,
         .outputs = mstmm_sweep_generic4_tangent_steady_outputs,
-        .ir_hash = "1ef38d5fd935afb075798f20ff029cc50d6739818075674dd103d1b6921824af",
+        .ir_hash = "c78d3ae3c154b3ca014eba3a1bf953327fad40f60a4752a52c8fb365853356d9",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -12847,7 +12847,7 @@ static const mstmm_kernel mstmm_sweep_generic4_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic4_tangent_turning_inputs,
         .outputs = mstmm_sweep_generic4_tangent_turning_outputs,
-        .ir_hash = "2df784f48feddff4ac1876761e7f00a3d728948242146e682a2cc0788fd72a99",
+        .ir_hash = "7866fe2bc93dc892ecd6c258bcefe3173dde3c6db63c05ceffdb22088bf05765",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -12859,7 +12859,7 @@ static const mstmm_kernel mstmm_sweep_generic4_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_sweep_generic4_tangent_rows_inputs,
         .outputs = mstmm_sweep_generic4_tangent_rows_outputs,
-        .ir_hash = "8b204576966947000bb7adcb7edc47e4a0963ba54e15bb5d81da8ff8e7f18209",
+        .ir_hash = "7fe0d87f543132efd6863ae5691c5f9eebd230b437478a20f1f795d7666c521c",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -12871,7 +12871,7 @@ static const mstmm_kernel mstmm_sweep_generic4_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic4_tangent_reduce_inputs,
         .outputs = mstmm_sweep_generic4_tangent_reduce_outputs,
-        .ir_hash = "478a0844e173a9a011e2f092834e3ac75dfdb928124de3a79a51f45ecbcf7881",
+        .ir_hash = "922d3c7db1efcfa0028e49714bf7c581c65b522a63a735942b780aa826650db6",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -12883,7 +12883,7 @@ static const mstmm_kernel mstmm_sweep_generic4_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic4_tangent_push_inputs,
         .outputs = mstmm_sweep_generic4_tangent_push_outputs,
-        .ir_hash = "7cc7f6963ceea313550eca604a8dc1c6824875da36284c5a7bb2763bebf5090a",
+        .ir_hash = "341f098a890652b1b45a9e8e15b971069edf6646f7454052229323b470766c24",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -12895,7 +12895,7 @@ static const mstmm_kernel mstmm_sweep_generic4_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic4_tangent_answer_inputs,
         .outputs = mstmm_sweep_generic4_tangent_answer_outputs,
-        .ir_hash = "12a66bb105693834b0a07535603f63d46c4a29d5c6abe42a0f3651d07a8153a5",
+        .ir_hash = "8f6b87907f8ef824a5ce33dfc581aebcd40acf6f9e5841ec8b26c39e483aa30c",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -12907,7 +12907,7 @@ static const mstmm_kernel mstmm_sweep_generic4_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic4_tangent_push_known_inputs,
         .outputs = mstmm_sweep_generic4_tangent_push_known_outputs,
-        .ir_hash = "f76b02f988ea2d48fb8a9585a9fd004b0fbb62970b807fe4f8120e0082e36221",
+        .ir_hash = "e4f60fb0f91266f96739054738072a35b379a8243d51909d0e3ac0e7b7e3460f",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -12919,7 +12919,7 @@ static const mstmm_kernel mstmm_sweep_generic4_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic4_tangent_answer_known_inputs,
         .outputs = mstmm_sweep_generic4_tangent_answer_known_outputs,
-        .ir_hash = "9889092499037dab3a2c814d700ed2db97a89b9f52f3e5c7709517481576e9c5",
+        .ir_hash = "b9b6bfa6ddf37aca2e999f734ffda8a7eb7371369c1a0ec2c9071cba871f95cc",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -12931,7 +12931,7 @@ static const mstmm_kernel mstmm_sweep_generic4_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_generic4_complement_inputs,
         .outputs = mstmm_sweep_generic4_complement_outputs,
-        .ir_hash = "5a18b335b419e35806cdb8b92fd2fc28b8045b5d4e8a652409474bfe020dd26e",
+        .ir_hash = "18756b563fdfe920c11b467926c35ffaf49f472a4d96003d6faa1e491f862b4c",
         .n_guards = 4,
         .guards = mstmm_sweep_generic4_complement_guards,
     },
@@ -12967,7 +12967,7 @@ static const mstmm_kernel mstmm_sweep_generic4_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_generic4_answered_inputs,
         .outputs = mstmm_sweep_generic4_answered_outputs,
-        .ir_hash = "1e17842b694a6edcb8fe8f752f2534686fc1cdb33c1fd4a707e5ae6b89df2b89",
+        .ir_hash = "f37c5e0470013e7a04d14fe0988773df0162c3fec9a87f13c3f3e8a0bb14af89",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -12979,7 +12979,7 @@ static const mstmm_kernel mstmm_sweep_generic4_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_generic4_pull_inputs,
         .outputs = mstmm_sweep_generic4_pull_outputs,
-        .ir_hash = "0bb7ecf350680996c51db62927859d5658d29fbe333b1f0bdabdf0142e099e33",
+        .ir_hash = "58a9f280b2c22932bf8940495154fe6fd0c211c5cb13dd04054f169d4345a30a",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -12991,7 +12991,7 @@ static const mstmm_kernel mstmm_sweep_generic4_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_generic4_exerted_inputs,
         .outputs = mstmm_sweep_generic4_exerted_outputs,
-        .ir_hash = "a7e6f4a31333396eb8117de78a5eca034cca1891ee991f0d601299186eb7b9cd",
+        .ir_hash = "51603336a7131de3307e1277ed34834cd9127295cfc46df3ac00f9332fae96f7",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -13003,7 +13003,7 @@ static const mstmm_kernel mstmm_sweep_generic4_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_generic4_push_on_ground_inputs,
         .outputs = mstmm_sweep_generic4_push_on_ground_outputs,
-        .ir_hash = "9de308c3bd26cbbfb3da999a62fcf4be7a34f016fc127414e6466fbe5fd6f95b",
+        .ir_hash = "7b765849b2d961699ea6d3ca4d52ebc911bd3321bc16071534de4b9a48e3caf7",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -13073,7 +13073,7 @@ const mstmm_element mstmm_sweep_generic4 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic4",
-    .hash = "3373565d22e1cf8488610e76f554ca791c983cb180230fd1fd57d22fe9be3e83",
+    .hash = "6804857cfd7a8b207fc85fd956cccf49b0244c26daa242f5754ed1073a9c3f9b",
     .nq = 0,
     .nu = 0,
     .np = 0,

@@ -108,7 +108,7 @@ int mstmm_sweep_generic5_pull_slope(const real *restrict y, const real *restrict
 
 #ifndef MSTMM_TWO
 #define MSTMM_TWO
-/* Two numbers at a time, in a register and in an array. */
+/* Pairs of numbers, in a register and in an array. */
 typedef real two_t __attribute__((vector_size(2 * sizeof(real))));
 typedef real two_free_t __attribute__((vector_size(2 * sizeof(real)), aligned(sizeof(real)), may_alias));
 
@@ -123,7 +123,7 @@ static inline __attribute__((always_inline, unused)) two_t mstmm_apart(const rea
 }
 #endif
 
-/* bias motion behind a hinge with 5 speeds
+/* bias motion outboard of a hinge with 5 speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rt[3][3] rotation, inboard hinge axes to parent axes
@@ -2994,7 +2994,7 @@ static const mstmm_guard mstmm_sweep_generic5_project_guards[] = {
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][5] motion subspace of the free coordinates
  * in  J[5] (kg*m2 or kg) rotor inertia reflected to the speeds
- * in  W[5][5] change of the efforts of laws, a row a speed
+ * in  W[5][5] change of the efforts of laws, one row per speed
  * in  floor[2] (kg, kg*m2) least inertia along and about an axis that is not rounding
  * in  S[21] f = S a + e of everything outboard, at P
  * out F[5][5] D = L diag(d) L^T: L, and 1 / d on the diagonal
@@ -4610,7 +4610,7 @@ static const mstmm_guard mstmm_sweep_generic5_factor_guards[] = {
     {1, "speed 5 of 5 moves no inertia: its acceleration is undetermined"},
 };
 
-/* load of a column carried across a hinge with 5 free speeds
+/* load of a right-hand side carried across a hinge with 5 free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -4618,7 +4618,7 @@ static const mstmm_guard mstmm_sweep_generic5_factor_guards[] = {
  * in  H[6][5] motion subspace of the free coordinates
  * in  G[5][6] D^-1 H^T S
  * in  e[6] (N, N*m) force part of f = S a + e, at P
- * in  tau[5] (N, N*m) the column's efforts on the free coordinates
+ * in  tau[5] (N, N*m) efforts of the right-hand side on the free coordinates
  * out y[5] (N, N*m) tau - H^T e
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
@@ -4855,7 +4855,7 @@ static const mstmm_port mstmm_sweep_generic5_push_outputs[] = {
     {"e_I", 6, "N, N*m", 1, 0},
 };
 
-/* accelerations that answer a column, across a hinge with 5 free speeds
+/* accelerations due to a right-hand side, across a hinge with 5 free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -5114,7 +5114,7 @@ static const mstmm_port mstmm_sweep_generic5_answer_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
-/* rows behind a hinge with 5 free speeds
+/* rows outboard of a hinge with 5 free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * source: Gauss, J. reine angew. Math. 4 (1829) 232-235 (least constraint)
@@ -5123,14 +5123,14 @@ static const mstmm_port mstmm_sweep_generic5_answer_outputs[] = {
  * in  J[5] (kg*m2 or kg) rotor inertia reflected to the speeds
  * in  floor[2] (kg, kg*m2) least inertia along and about an axis that is not rounding
  * in  U[21] upper triangle, row by row: S = U^T U
- * in  d[6] load that rows take: f = U^T (U a + d) + e
+ * in  d[6] load in the rows: f = U^T (U a + d) + e
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  tau[5] (N, N*m) efforts on the free coordinates
  * out G[5][6] udot = g - G a_Q
  * out g[5] udot = g - G a_Q
- * out V[21] upper triangle of what is behind the hinge
- * out d_V[6] load that its rows take
- * out e_Q[6] (N, N*m) load that they do not take
+ * out V[21] upper triangle outboard of the hinge
+ * out d_V[6] load in its rows
+ * out e_Q[6] (N, N*m) load outside the rows
  */
 int mstmm_sweep_generic5_qr_eliminate(const real *restrict H, const real *restrict J,
     const real *restrict floor_, const real *restrict U, const real *restrict d,
@@ -7547,14 +7547,14 @@ static const mstmm_port mstmm_sweep_generic5_tangent_carrier_outputs[] = {
 /* a direction of a hinge with 5 speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  theta[3] turn of the body along the direction, body axes
- * in  x[3] change of place of P along the direction, body axes
+ * in  theta[3] rotation of the body along the direction, body axes
+ * in  x[3] displacement of P along the direction, body axes
  * in  H[6][5]
  * in  s[5]
  * in  v[3]
  * in  w[3]
  * in  Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
- * in  f[6] (N, N*m) load at P that is carried
+ * in  f[6] (N, N*m) carried load at P
  * in  d_H[6][5]
  * in  d_v[3]
  * in  d_w[3]
@@ -7563,7 +7563,7 @@ static const mstmm_port mstmm_sweep_generic5_tangent_carrier_outputs[] = {
  * in  J[5] (kg*m2 or kg) rotor inertia reflected to the speeds
  * in  laws[5] change of the laws' efforts
  * out B[9] motion along the direction
- * out G[6] change of the load that is carried
+ * out G[6] change of the carried load
  * out row[5] change of the rows by load, rotors and laws
  */
 int mstmm_sweep_generic5_tangent_column(const real *restrict theta, const real *restrict x,
@@ -7972,13 +7972,13 @@ static const mstmm_port mstmm_sweep_generic5_tangent_column_outputs[] = {
     {"row", 5, "", 0, 0},
 };
 
-/* turn and change of place along coordinates of a hinge with 5 free speeds
+/* rotation and displacement along coordinates of a hinge with 5 free speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  H[6][5]
  * in  d_q[5]
- * out theta[3] turn of the body along the direction, body axes
- * out x[3] change of place of P along the direction, body axes
+ * out theta[3] rotation of the body along the direction, body axes
+ * out x[3] displacement of P along the direction, body axes
  */
 int mstmm_sweep_generic5_tangent_along(const real *restrict H, const real *restrict d_q,
     real *restrict theta, real *restrict x)
@@ -8065,19 +8065,19 @@ static const mstmm_port mstmm_sweep_generic5_tangent_along_outputs[] = {
 /* a direction of a hinge with 5 free speeds, whose subspace is constant
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  theta[3] turn of the body along the direction, body axes
- * in  x[3] change of place of P along the direction, body axes
+ * in  theta[3] rotation of the body along the direction, body axes
+ * in  x[3] displacement of P along the direction, body axes
  * in  H[6][5]
  * in  v[3]
  * in  w[3]
  * in  Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
- * in  f[6] (N, N*m) load at P that is carried
+ * in  f[6] (N, N*m) carried load at P
  * in  d_u[5]
  * in  d_s[5]
  * in  J[5] (kg*m2 or kg) rotor inertia reflected to the speeds
  * in  laws[5] change of the laws' efforts
  * out B[9] motion along the direction
- * out G[6] change of the load that is carried
+ * out G[6] change of the carried load
  * out row[5] change of the rows by load, rotors and laws
  */
 int mstmm_sweep_generic5_tangent_steady(const real *restrict theta, const real *restrict x,
@@ -8433,20 +8433,20 @@ static const mstmm_port mstmm_sweep_generic5_tangent_steady_outputs[] = {
     {"row", 5, "", 0, 0},
 };
 
-/* a direction of a hinge with 5 free speeds, which turns about constant axes
+/* a direction of a hinge with 5 free speeds, which rotates about constant axes
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  theta[3] turn of the body along the direction, body axes
+ * in  theta[3] rotation of the body along the direction, body axes
  * in  H[6][5]
  * in  w[3]
  * in  Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
- * in  f[6] (N, N*m) load at P that is carried
+ * in  f[6] (N, N*m) carried load at P
  * in  d_u[5]
  * in  d_s[5]
  * in  J[5] (kg*m2 or kg) rotor inertia reflected to the speeds
  * in  laws[5] change of the laws' efforts
  * out B[9] motion along the direction
- * out G[6] change of the load that is carried
+ * out G[6] change of the carried load
  * out row[5] change of the rows by load, rotors and laws
  */
 int mstmm_sweep_generic5_tangent_turning(const real *restrict theta, const real *restrict H,
@@ -8645,9 +8645,9 @@ static const mstmm_port mstmm_sweep_generic5_tangent_turning_outputs[] = {
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  H[6][5] motion subspace of the unknowns
  * in  B[5][9] motion along the unknowns
- * in  W[5][5] slopes of the rows, a row a direction
- * in  S[9][6] change of the load by that of the motion, a row an entry
- * out K[5][6] S B, a row a direction
+ * in  W[5][5] derivatives of the rows, one row per direction
+ * in  S[9][6] change of the load by that of the motion, one row per entry
+ * out K[5][6] S B, one row per direction
  * out right[5][9] rows by the motion
  * out D[5][5] rows by unknowns
  * out one[5][5] unit matrix
@@ -9203,11 +9203,11 @@ static const mstmm_port mstmm_sweep_generic5_tangent_rows_outputs[] = {
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  inverse[5][5] D^-1
  * in  right[5][9] rows by the motion
- * in  K[5][6] S B, a row a direction
- * in  G[5][6] change of the load that is carried
+ * in  K[5][6] S B, one row per direction
+ * in  G[5][6] change of the carried load
  * out gain[5][9] D^-1 times the rows by the motion
- * out V[5][6] K + G, a row a direction
- * out S[9][6] change of the load by that of the motion, a row an entry, added to what is there
+ * out V[5][6] K + G, one row per direction
+ * out S[9][6] change of the load by that of the motion, one row per entry, added to what is there
  */
 int mstmm_sweep_generic5_tangent_reduce(const real *restrict inverse, const real *restrict right,
     const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
@@ -9417,11 +9417,11 @@ static const mstmm_port mstmm_sweep_generic5_tangent_reduce_outputs[] = {
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][5] motion subspace of the unknowns
- * in  V[5][6] K + G, a row a direction
+ * in  V[5][6] K + G, one row per direction
  * in  inverse[5][5] D^-1
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  e_f[5] load of the rows
- * out y[5] D^-1 times what is left of the rows
+ * out y[5] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
 int mstmm_sweep_generic5_tangent_push(const real *restrict Rc, const real *restrict r,
@@ -9708,7 +9708,7 @@ static const mstmm_port mstmm_sweep_generic5_tangent_push_outputs[] = {
     {"e_I", 6, "N, N*m", 1, 0},
 };
 
-/* unknowns of a hinge with 5 free speeds that answer a right-hand side
+/* solution of a hinge with 5 free speeds for a right-hand side
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -9719,7 +9719,7 @@ static const mstmm_port mstmm_sweep_generic5_tangent_push_outputs[] = {
  * in  z_I[9] change of the parent's motion, parent axes
  * in  B[5][9] motion along the unknowns
  * in  gain[5][9] D^-1 times the rows by the motion
- * in  y[5] D^-1 times what is left of the rows
+ * in  y[5] D^-1 times the remainder of the rows
  * out x[5] unknowns
  * out z[9] change of the body's motion, own axes
  */
@@ -10074,18 +10074,18 @@ static const mstmm_port mstmm_sweep_generic5_tangent_answer_outputs[] = {
     {"z", 9, "", 0, 0},
 };
 
-/* a right-hand side carried across a hinge with 5 free speeds and increments that are known
+/* a right-hand side carried across a hinge with 5 free speeds and known increments
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][5] motion subspace of the unknowns
- * in  V[5][6] K + G, a row a direction
+ * in  V[5][6] K + G, one row per direction
  * in  inverse[5][5] D^-1
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  e_f[5] load of the rows
- * in  e_b[6] (N, N*m) load by what is known, without the unknowns
- * out y[5] D^-1 times what is left of the rows
+ * in  e_b[6] (N, N*m) load due to known increments, without the unknowns
+ * out y[5] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
 int mstmm_sweep_generic5_tangent_push_known(const real *restrict Rc, const real *restrict r,
@@ -10380,7 +10380,7 @@ static const mstmm_port mstmm_sweep_generic5_tangent_push_known_outputs[] = {
     {"e_I", 6, "N, N*m", 1, 0},
 };
 
-/* unknowns of a hinge with 5 free speeds that answer a right-hand side and increments that are known
+/* solution of a hinge with 5 free speeds for a right-hand side and known increments
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -10391,8 +10391,8 @@ static const mstmm_port mstmm_sweep_generic5_tangent_push_known_outputs[] = {
  * in  z_I[9] change of the parent's motion, parent axes
  * in  B[5][9] motion along the unknowns
  * in  gain[5][9] D^-1 times the rows by the motion
- * in  y[5] D^-1 times what is left of the rows
- * in  b[9] change of motion that is known
+ * in  y[5] D^-1 times the remainder of the rows
+ * in  b[9] known change of motion
  * out x[5] unknowns
  * out z[9] change of the body's motion, own axes
  */
@@ -10757,10 +10757,10 @@ static const mstmm_port mstmm_sweep_generic5_tangent_answer_known_outputs[] = {
     {"z", 9, "", 0, 0},
 };
 
-/* what a hinge with 5 speeds lets go and holds
+/* free and constrained directions of a hinge with 5 speeds
  * source: Householder, J. ACM 5 (1958) 339-342 (reflections)
  * in  H[6][5] motion subspace
- * out W[6][6] rows: H^+, then what the hinge holds
+ * out W[6][6] rows: H^+, then the constrained directions
  */
 int mstmm_sweep_generic5_complement(const real *restrict H, real *restrict W)
 {
@@ -11751,7 +11751,7 @@ static const mstmm_port mstmm_sweep_generic5_couple_outputs[] = {
     {"L_ij", 1, "", 1, 0},
 };
 
-/* what a hinge with 5 speeds tells a row
+/* contribution of a hinge with 5 speeds to a row
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  y[5] tau - H^T e
@@ -11789,7 +11789,7 @@ static const mstmm_port mstmm_sweep_generic5_answered_outputs[] = {
     {"l", 1, "", 1, 0},
 };
 
-/* a multiplier felt by a hinge with 5 speeds
+/* contribution of a multiplier to a hinge with 5 speeds
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  y[5] of the row
@@ -11826,7 +11826,7 @@ static const mstmm_port mstmm_sweep_generic5_pull_outputs[] = {
     {"y_0", 5, "", 1, 0},
 };
 
-/* load of what a hinge with 5 speeds accelerates
+/* load of the bodies accelerated by a hinge with 5 speeds
  * in  S[21] inertia of everything outboard, at P
  * in  H[6][5] motion subspace
  * in  udot[5] accelerations of the coordinates
@@ -12244,12 +12244,12 @@ static const mstmm_port mstmm_sweep_generic5_exerted_outputs[] = {
     {"e", 6, "N, N*m", 0, 0},
 };
 
-/* load of a column felt by a hinge on the ground with 5 free speeds
+/* load of a right-hand side along a hinge on the ground with 5 free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  H[6][5] motion subspace of the free coordinates
  * in  e[6] (N, N*m) force part of f = S a + e, at P
- * in  tau[5] (N, N*m) the column's efforts on the free coordinates
+ * in  tau[5] (N, N*m) efforts of the right-hand side on the free coordinates
  * out y[5] (N, N*m) tau - H^T e
  */
 int mstmm_sweep_generic5_push_on_ground(const real *restrict H, const real *restrict e,
@@ -15583,7 +15583,7 @@ static const mstmm_kernel mstmm_sweep_generic5_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic5_forward_inputs,
         .outputs = mstmm_sweep_generic5_forward_outputs,
-        .ir_hash = "07427e30dc2c47bd496c747782259835d1763064e6ab2053c63cc6da901d062a",
+        .ir_hash = "8b14be1eee1985d1270d77058ef9a2b25d6df1deeddb0efb4593dc00bd031aca",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -15643,7 +15643,7 @@ static const mstmm_kernel mstmm_sweep_generic5_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic5_factor_inputs,
         .outputs = mstmm_sweep_generic5_factor_outputs,
-        .ir_hash = "8bec43ceb34b063f673a415ad307d4e887367a2955afe54822d2640e7d9072e6",
+        .ir_hash = "547e408ee71c10aea2fd815a01de80100ae7689c496391f457dc4c021fa559eb",
         .n_guards = 10,
         .guards = mstmm_sweep_generic5_factor_guards,
     },
@@ -15655,7 +15655,7 @@ static const mstmm_kernel mstmm_sweep_generic5_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic5_push_inputs,
         .outputs = mstmm_sweep_generic5_push_outputs,
-        .ir_hash = "305f45223d60edde188b4113c8f35e354a15f69d770f0c398039d9468631c766",
+        .ir_hash = "995d1399b4c980d30e505a6ec628fd5f800705f5b2132e8e928ae567f4e76fcd",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -15667,7 +15667,7 @@ static const mstmm_kernel mstmm_sweep_generic5_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic5_answer_inputs,
         .outputs = mstmm_sweep_generic5_answer_outputs,
-        .ir_hash = "77ca19417e9831f899d9061916cef696ffcd5fa68ccd5a438a8b4cba858fb247",
+        .ir_hash = "dc8f462ff00602ebddc2b87abe0d430cc955abb85a26c550d94e24f6242a186d",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -15679,7 +15679,7 @@ static const mstmm_kernel mstmm_sweep_generic5_kernels[] = {
         .n_outputs = 5,
         .inputs = mstmm_sweep_generic5_qr_eliminate_inputs,
         .outputs = mstmm_sweep_generic5_qr_eliminate_outputs,
-        .ir_hash = "4cee7ee46f4ddd2277b0729fa161a091367dae37cf6aa31a4ccde63ebb9c03bd",
+        .ir_hash = "49a02c27ded1e8bdde9429c2ea28f7983a65395d2fbf5d50f5f717a45a2c7463",
         .n_guards = 10,
         .guards = mstmm_sweep_generic5_qr_eliminate_guards,
     },
@@ -15703,7 +15703,7 @@ static const mstmm_kernel mstmm_sweep_generic5_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic5_tangent_column_inputs,
         .outputs = mstmm_sweep_generic5_tangent_column_outputs,
-        .ir_hash = "daba5d469bc40e0e2ae02644562ce07fd62b8a4b7674c95dd8f9222cebe71ef2",
+        .ir_hash = "bd321d9ec37d27d1504b710ebef6a5faea7208d728cbfc65dad5f5b7b31d5bd4",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -15715,7 +15715,7 @@ static const mstmm_kernel mstmm_sweep_generic5_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic5_tangent_along_inputs,
         .outputs = mstmm_sweep_generic5_tangent_along_outputs,
-        .ir_hash = "532ce798cb5dda96e61fd066a76417f7cecad2fe62e7af0b8f653b9e786e85fb",
+        .ir_hash = "31a78ee408020928e2f8a21a18de49268d8dbff0675584a13a2dd393c9d97454",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -15727,7 +15727,7 @@ static const mstmm_kernel mstmm_sweep_generic5_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic5_tangent_steady_inputs,
         .outputs = mstmm_sweep_generic5_tangent_steady_outputs,
-        .ir_hash = "02c2dcccdfa3569172cf8c8e5f9065439c8c8e17d5344e034cd37a98f940c0b8",
+        .ir_hash = "f308c3427161d62aa27dc8fa2b54e17fecbe6a668b5a5dc616e8f2e9818651b2",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -15739,7 +15739,7 @@ static const mstmm_kernel mstmm_sweep_generic5_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic5_tangent_turning_inputs,
         .outputs = mstmm_sweep_generic5_tangent_turning_outputs,
-        .ir_hash = "4bba88778fd90adcaa024d16538d1672c918f66461ff868968bd335a8e8a2abe",
+        .ir_hash = "8a507cb91a74057776f3f520cb50696fc41cc9a91e0f028ff9bc45832624d6c8",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -15751,7 +15751,7 @@ static const mstmm_kernel mstmm_sweep_generic5_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_sweep_generic5_tangent_rows_inputs,
         .outputs = mstmm_sweep_generic5_tangent_rows_outputs,
-        .ir_hash = "5c5be2878b5213759e229fdc275b8e5be64eaacd2419e4226271acbc2d6f95ce",
+        .ir_hash = "cf142a1871975eba177bb6938abad0f14e929391d3c585e90b45695bb2f22aaa",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -15763,7 +15763,7 @@ static const mstmm_kernel mstmm_sweep_generic5_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic5_tangent_reduce_inputs,
         .outputs = mstmm_sweep_generic5_tangent_reduce_outputs,
-        .ir_hash = "0faed90505aea4646d1481a4b72983eed9362c20d7f497e394d10b242a08b818",
+        .ir_hash = "a302f3efa4ebc1ce810d501229bab4d568aec722cc6701d36a36453ee5f95789",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -15775,7 +15775,7 @@ static const mstmm_kernel mstmm_sweep_generic5_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic5_tangent_push_inputs,
         .outputs = mstmm_sweep_generic5_tangent_push_outputs,
-        .ir_hash = "9c0e30a97b02ac29454dda19d7e48952255a9f43696c0b5dca85c90ff4288d48",
+        .ir_hash = "a82a2e91dc5d8a2ccf25049225dbc3acde8362dd50bd153866a167973ecb2441",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -15787,7 +15787,7 @@ static const mstmm_kernel mstmm_sweep_generic5_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic5_tangent_answer_inputs,
         .outputs = mstmm_sweep_generic5_tangent_answer_outputs,
-        .ir_hash = "22d59cb09090d5e07b4219a3add61b2f4954132ffce930892e523bdaf37bc733",
+        .ir_hash = "79d75e249554eb077e6a1ae012e282cd989c68ce263d30cecefc5f78fd907afb",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -15799,7 +15799,7 @@ static const mstmm_kernel mstmm_sweep_generic5_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic5_tangent_push_known_inputs,
         .outputs = mstmm_sweep_generic5_tangent_push_known_outputs,
-        .ir_hash = "9d8f6a7f39003c977aee737932810cd34f9566cd27ddc4f3b1aff28afd98c01a",
+        .ir_hash = "2fad4feaeb26fe816dbd3564f9dfb268c43b7b19bf4de67da93cf6fdee4f369d",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -15811,7 +15811,7 @@ static const mstmm_kernel mstmm_sweep_generic5_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic5_tangent_answer_known_inputs,
         .outputs = mstmm_sweep_generic5_tangent_answer_known_outputs,
-        .ir_hash = "642b48f7666d2e2eeef43bdb7bbfbaccdb413b846d842b12adb91ad270970add",
+        .ir_hash = "f6373e1a986cf6772f996780d6753a839731cb30ac57e0de76a777b9d6e143f2",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -15823,7 +15823,7 @@ static const mstmm_kernel mstmm_sweep_generic5_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_generic5_complement_inputs,
         .outputs = mstmm_sweep_generic5_complement_outputs,
-        .ir_hash = "4e308a772c669ee4494b82c89b92c22da0272e0d8c39601bb699555f1c29eda9",
+        .ir_hash = "36b06fca385445b88994c1fb7107d8a54a962c47cd20fd1603b8a8e34c568839",
         .n_guards = 5,
         .guards = mstmm_sweep_generic5_complement_guards,
     },
@@ -15859,7 +15859,7 @@ static const mstmm_kernel mstmm_sweep_generic5_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_generic5_answered_inputs,
         .outputs = mstmm_sweep_generic5_answered_outputs,
-        .ir_hash = "fe494bd82c8da49836706f2fb17f5fd009c55e1a254bfd61d7a5fcd8b95b1671",
+        .ir_hash = "701dd50188e552089553f1f52906c97ad41fe0cedf4a2d1acfddee0e50beba4a",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -15871,7 +15871,7 @@ static const mstmm_kernel mstmm_sweep_generic5_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_generic5_pull_inputs,
         .outputs = mstmm_sweep_generic5_pull_outputs,
-        .ir_hash = "bdf00556b7124a41610210b398babfff4175f34356d2de5dbc32423788bae808",
+        .ir_hash = "b1b0aff8790ac447ee2cfabd94de1dab512f19e31e7260cf8ddea96ecf9cd12a",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -15883,7 +15883,7 @@ static const mstmm_kernel mstmm_sweep_generic5_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_generic5_exerted_inputs,
         .outputs = mstmm_sweep_generic5_exerted_outputs,
-        .ir_hash = "7bd97152a6ab5fcb77ab9c4b0cc40a290dbf866775695d8a9672b20f7a94d32c",
+        .ir_hash = "cbd7fd8e491f8148590bbbadd34e758e0ce4523cfab01eb86fc8018748b2bbed",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -15895,7 +15895,7 @@ static const mstmm_kernel mstmm_sweep_generic5_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_generic5_push_on_ground_inputs,
         .outputs = mstmm_sweep_generic5_push_on_ground_outputs,
-        .ir_hash = "99f75a3fa0f57b3b45032a0960ac1a428fd6453f40b6b4ae83a602b25019d289",
+        .ir_hash = "02c7a7af655d2f86dce6140180fc92d524534cdf2b8520731419acf125024f53",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -15965,7 +15965,7 @@ const mstmm_element mstmm_sweep_generic5 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic5",
-    .hash = "3eec7e472167495ba01ab91be9d5b9661243225b9aaa1d188f3a8d6597fb39a5",
+    .hash = "9f0b9d0355e2a1501f5478d4b4b7d3f2a2461a7d0d2f552eecc33e6b791eec43",
     .nq = 0,
     .nu = 0,
     .np = 0,

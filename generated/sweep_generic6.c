@@ -108,7 +108,7 @@ int mstmm_sweep_generic6_pull_slope(const real *restrict y, const real *restrict
 
 #ifndef MSTMM_TWO
 #define MSTMM_TWO
-/* Two numbers at a time, in a register and in an array. */
+/* Pairs of numbers, in a register and in an array. */
 typedef real two_t __attribute__((vector_size(2 * sizeof(real))));
 typedef real two_free_t __attribute__((vector_size(2 * sizeof(real)), aligned(sizeof(real)), may_alias));
 
@@ -123,7 +123,7 @@ static inline __attribute__((always_inline, unused)) two_t mstmm_apart(const rea
 }
 #endif
 
-/* bias motion behind a hinge with 6 speeds
+/* bias motion outboard of a hinge with 6 speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rt[3][3] rotation, inboard hinge axes to parent axes
@@ -3593,7 +3593,7 @@ static const mstmm_guard mstmm_sweep_generic6_project_guards[] = {
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][6] motion subspace of the free coordinates
  * in  J[6] (kg*m2 or kg) rotor inertia reflected to the speeds
- * in  W[6][6] change of the efforts of laws, a row a speed
+ * in  W[6][6] change of the efforts of laws, one row per speed
  * in  floor[2] (kg, kg*m2) least inertia along and about an axis that is not rounding
  * in  S[21] f = S a + e of everything outboard, at P
  * out F[6][6] D = L diag(d) L^T: L, and 1 / d on the diagonal
@@ -5599,7 +5599,7 @@ static const mstmm_guard mstmm_sweep_generic6_factor_guards[] = {
     {1, "speed 6 of 6 moves no inertia: its acceleration is undetermined"},
 };
 
-/* load of a column carried across a hinge with 6 free speeds
+/* load of a right-hand side carried across a hinge with 6 free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -5607,7 +5607,7 @@ static const mstmm_guard mstmm_sweep_generic6_factor_guards[] = {
  * in  H[6][6] motion subspace of the free coordinates
  * in  G[6][6] D^-1 H^T S
  * in  e[6] (N, N*m) force part of f = S a + e, at P
- * in  tau[6] (N, N*m) the column's efforts on the free coordinates
+ * in  tau[6] (N, N*m) efforts of the right-hand side on the free coordinates
  * out y[6] (N, N*m) tau - H^T e
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
@@ -5869,7 +5869,7 @@ static const mstmm_port mstmm_sweep_generic6_push_outputs[] = {
     {"e_I", 6, "N, N*m", 1, 0},
 };
 
-/* accelerations that answer a column, across a hinge with 6 free speeds
+/* accelerations due to a right-hand side, across a hinge with 6 free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -6174,7 +6174,7 @@ static const mstmm_port mstmm_sweep_generic6_answer_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
-/* rows behind a hinge with 6 free speeds
+/* rows outboard of a hinge with 6 free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * source: Gauss, J. reine angew. Math. 4 (1829) 232-235 (least constraint)
@@ -6183,14 +6183,14 @@ static const mstmm_port mstmm_sweep_generic6_answer_outputs[] = {
  * in  J[6] (kg*m2 or kg) rotor inertia reflected to the speeds
  * in  floor[2] (kg, kg*m2) least inertia along and about an axis that is not rounding
  * in  U[21] upper triangle, row by row: S = U^T U
- * in  d[6] load that rows take: f = U^T (U a + d) + e
+ * in  d[6] load in the rows: f = U^T (U a + d) + e
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  tau[6] (N, N*m) efforts on the free coordinates
  * out G[6][6] udot = g - G a_Q
  * out g[6] udot = g - G a_Q
- * out V[21] upper triangle of what is behind the hinge
- * out d_V[6] load that its rows take
- * out e_Q[6] (N, N*m) load that they do not take
+ * out V[21] upper triangle outboard of the hinge
+ * out d_V[6] load in its rows
+ * out e_Q[6] (N, N*m) load outside the rows
  */
 int mstmm_sweep_generic6_qr_eliminate(const real *restrict H, const real *restrict J,
     const real *restrict floor_, const real *restrict U, const real *restrict d,
@@ -9163,14 +9163,14 @@ static const mstmm_port mstmm_sweep_generic6_tangent_carrier_outputs[] = {
 /* a direction of a hinge with 6 speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  theta[3] turn of the body along the direction, body axes
- * in  x[3] change of place of P along the direction, body axes
+ * in  theta[3] rotation of the body along the direction, body axes
+ * in  x[3] displacement of P along the direction, body axes
  * in  H[6][6]
  * in  s[6]
  * in  v[3]
  * in  w[3]
  * in  Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
- * in  f[6] (N, N*m) load at P that is carried
+ * in  f[6] (N, N*m) carried load at P
  * in  d_H[6][6]
  * in  d_v[3]
  * in  d_w[3]
@@ -9179,7 +9179,7 @@ static const mstmm_port mstmm_sweep_generic6_tangent_carrier_outputs[] = {
  * in  J[6] (kg*m2 or kg) rotor inertia reflected to the speeds
  * in  laws[6] change of the laws' efforts
  * out B[9] motion along the direction
- * out G[6] change of the load that is carried
+ * out G[6] change of the carried load
  * out row[6] change of the rows by load, rotors and laws
  */
 int mstmm_sweep_generic6_tangent_column(const real *restrict theta, const real *restrict x,
@@ -9627,13 +9627,13 @@ static const mstmm_port mstmm_sweep_generic6_tangent_column_outputs[] = {
     {"row", 6, "", 0, 0},
 };
 
-/* turn and change of place along coordinates of a hinge with 6 free speeds
+/* rotation and displacement along coordinates of a hinge with 6 free speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  H[6][6]
  * in  d_q[6]
- * out theta[3] turn of the body along the direction, body axes
- * out x[3] change of place of P along the direction, body axes
+ * out theta[3] rotation of the body along the direction, body axes
+ * out x[3] displacement of P along the direction, body axes
  */
 int mstmm_sweep_generic6_tangent_along(const real *restrict H, const real *restrict d_q,
     real *restrict theta, real *restrict x)
@@ -9732,19 +9732,19 @@ static const mstmm_port mstmm_sweep_generic6_tangent_along_outputs[] = {
 /* a direction of a hinge with 6 free speeds, whose subspace is constant
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  theta[3] turn of the body along the direction, body axes
- * in  x[3] change of place of P along the direction, body axes
+ * in  theta[3] rotation of the body along the direction, body axes
+ * in  x[3] displacement of P along the direction, body axes
  * in  H[6][6]
  * in  v[3]
  * in  w[3]
  * in  Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
- * in  f[6] (N, N*m) load at P that is carried
+ * in  f[6] (N, N*m) carried load at P
  * in  d_u[6]
  * in  d_s[6]
  * in  J[6] (kg*m2 or kg) rotor inertia reflected to the speeds
  * in  laws[6] change of the laws' efforts
  * out B[9] motion along the direction
- * out G[6] change of the load that is carried
+ * out G[6] change of the carried load
  * out row[6] change of the rows by load, rotors and laws
  */
 int mstmm_sweep_generic6_tangent_steady(const real *restrict theta, const real *restrict x,
@@ -10127,20 +10127,20 @@ static const mstmm_port mstmm_sweep_generic6_tangent_steady_outputs[] = {
     {"row", 6, "", 0, 0},
 };
 
-/* a direction of a hinge with 6 free speeds, which turns about constant axes
+/* a direction of a hinge with 6 free speeds, which rotates about constant axes
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  theta[3] turn of the body along the direction, body axes
+ * in  theta[3] rotation of the body along the direction, body axes
  * in  H[6][6]
  * in  w[3]
  * in  Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
- * in  f[6] (N, N*m) load at P that is carried
+ * in  f[6] (N, N*m) carried load at P
  * in  d_u[6]
  * in  d_s[6]
  * in  J[6] (kg*m2 or kg) rotor inertia reflected to the speeds
  * in  laws[6] change of the laws' efforts
  * out B[9] motion along the direction
- * out G[6] change of the load that is carried
+ * out G[6] change of the carried load
  * out row[6] change of the rows by load, rotors and laws
  */
 int mstmm_sweep_generic6_tangent_turning(const real *restrict theta, const real *restrict H,
@@ -10354,9 +10354,9 @@ static const mstmm_port mstmm_sweep_generic6_tangent_turning_outputs[] = {
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  H[6][6] motion subspace of the unknowns
  * in  B[6][9] motion along the unknowns
- * in  W[6][6] slopes of the rows, a row a direction
- * in  S[9][6] change of the load by that of the motion, a row an entry
- * out K[6][6] S B, a row a direction
+ * in  W[6][6] derivatives of the rows, one row per direction
+ * in  S[9][6] change of the load by that of the motion, one row per entry
+ * out K[6][6] S B, one row per direction
  * out right[6][9] rows by the motion
  * out D[6][6] rows by unknowns
  * out one[6][6] unit matrix
@@ -11096,11 +11096,11 @@ static const mstmm_port mstmm_sweep_generic6_tangent_rows_outputs[] = {
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  inverse[6][6] D^-1
  * in  right[6][9] rows by the motion
- * in  K[6][6] S B, a row a direction
- * in  G[6][6] change of the load that is carried
+ * in  K[6][6] S B, one row per direction
+ * in  G[6][6] change of the carried load
  * out gain[6][9] D^-1 times the rows by the motion
- * out V[6][6] K + G, a row a direction
- * out S[9][6] change of the load by that of the motion, a row an entry, added to what is there
+ * out V[6][6] K + G, one row per direction
+ * out S[9][6] change of the load by that of the motion, one row per entry, added to what is there
  */
 int mstmm_sweep_generic6_tangent_reduce(const real *restrict inverse, const real *restrict right,
     const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
@@ -11356,11 +11356,11 @@ static const mstmm_port mstmm_sweep_generic6_tangent_reduce_outputs[] = {
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][6] motion subspace of the unknowns
- * in  V[6][6] K + G, a row a direction
+ * in  V[6][6] K + G, one row per direction
  * in  inverse[6][6] D^-1
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  e_f[6] load of the rows
- * out y[6] D^-1 times what is left of the rows
+ * out y[6] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
 int mstmm_sweep_generic6_tangent_push(const real *restrict Rc, const real *restrict r,
@@ -11694,7 +11694,7 @@ static const mstmm_port mstmm_sweep_generic6_tangent_push_outputs[] = {
     {"e_I", 6, "N, N*m", 1, 0},
 };
 
-/* unknowns of a hinge with 6 free speeds that answer a right-hand side
+/* solution of a hinge with 6 free speeds for a right-hand side
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -11705,7 +11705,7 @@ static const mstmm_port mstmm_sweep_generic6_tangent_push_outputs[] = {
  * in  z_I[9] change of the parent's motion, parent axes
  * in  B[6][9] motion along the unknowns
  * in  gain[6][9] D^-1 times the rows by the motion
- * in  y[6] D^-1 times what is left of the rows
+ * in  y[6] D^-1 times the remainder of the rows
  * out x[6] unknowns
  * out z[9] change of the body's motion, own axes
  */
@@ -12097,18 +12097,18 @@ static const mstmm_port mstmm_sweep_generic6_tangent_answer_outputs[] = {
     {"z", 9, "", 0, 0},
 };
 
-/* a right-hand side carried across a hinge with 6 free speeds and increments that are known
+/* a right-hand side carried across a hinge with 6 free speeds and known increments
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][6] motion subspace of the unknowns
- * in  V[6][6] K + G, a row a direction
+ * in  V[6][6] K + G, one row per direction
  * in  inverse[6][6] D^-1
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  e_f[6] load of the rows
- * in  e_b[6] (N, N*m) load by what is known, without the unknowns
- * out y[6] D^-1 times what is left of the rows
+ * in  e_b[6] (N, N*m) load due to known increments, without the unknowns
+ * out y[6] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
 int mstmm_sweep_generic6_tangent_push_known(const real *restrict Rc, const real *restrict r,
@@ -12450,7 +12450,7 @@ static const mstmm_port mstmm_sweep_generic6_tangent_push_known_outputs[] = {
     {"e_I", 6, "N, N*m", 1, 0},
 };
 
-/* unknowns of a hinge with 6 free speeds that answer a right-hand side and increments that are known
+/* solution of a hinge with 6 free speeds for a right-hand side and known increments
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -12461,8 +12461,8 @@ static const mstmm_port mstmm_sweep_generic6_tangent_push_known_outputs[] = {
  * in  z_I[9] change of the parent's motion, parent axes
  * in  B[6][9] motion along the unknowns
  * in  gain[6][9] D^-1 times the rows by the motion
- * in  y[6] D^-1 times what is left of the rows
- * in  b[9] change of motion that is known
+ * in  y[6] D^-1 times the remainder of the rows
+ * in  b[9] known change of motion
  * out x[6] unknowns
  * out z[9] change of the body's motion, own axes
  */
@@ -12864,10 +12864,10 @@ static const mstmm_port mstmm_sweep_generic6_tangent_answer_known_outputs[] = {
     {"z", 9, "", 0, 0},
 };
 
-/* what a hinge with 6 speeds lets go and holds
+/* free and constrained directions of a hinge with 6 speeds
  * source: Householder, J. ACM 5 (1958) 339-342 (reflections)
  * in  H[6][6] motion subspace
- * out W[6][6] rows: H^+, then what the hinge holds
+ * out W[6][6] rows: H^+, then the constrained directions
  */
 int mstmm_sweep_generic6_complement(const real *restrict H, real *restrict W)
 {
@@ -13806,7 +13806,7 @@ static const mstmm_port mstmm_sweep_generic6_couple_outputs[] = {
     {"L_ij", 1, "", 1, 0},
 };
 
-/* what a hinge with 6 speeds tells a row
+/* contribution of a hinge with 6 speeds to a row
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  y[6] tau - H^T e
@@ -13846,7 +13846,7 @@ static const mstmm_port mstmm_sweep_generic6_answered_outputs[] = {
     {"l", 1, "", 1, 0},
 };
 
-/* a multiplier felt by a hinge with 6 speeds
+/* contribution of a multiplier to a hinge with 6 speeds
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  y[6] of the row
@@ -13885,7 +13885,7 @@ static const mstmm_port mstmm_sweep_generic6_pull_outputs[] = {
     {"y_0", 6, "", 1, 0},
 };
 
-/* load of what a hinge with 6 speeds accelerates
+/* load of the bodies accelerated by a hinge with 6 speeds
  * in  S[21] inertia of everything outboard, at P
  * in  H[6][6] motion subspace
  * in  udot[6] accelerations of the coordinates
@@ -14381,12 +14381,12 @@ static const mstmm_port mstmm_sweep_generic6_exerted_outputs[] = {
     {"e", 6, "N, N*m", 0, 0},
 };
 
-/* load of a column felt by a hinge on the ground with 6 free speeds
+/* load of a right-hand side along a hinge on the ground with 6 free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  H[6][6] motion subspace of the free coordinates
  * in  e[6] (N, N*m) force part of f = S a + e, at P
- * in  tau[6] (N, N*m) the column's efforts on the free coordinates
+ * in  tau[6] (N, N*m) efforts of the right-hand side on the free coordinates
  * out y[6] (N, N*m) tau - H^T e
  */
 int mstmm_sweep_generic6_push_on_ground(const real *restrict H, const real *restrict e,
@@ -17600,7 +17600,7 @@ static const mstmm_kernel mstmm_sweep_generic6_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic6_forward_inputs,
         .outputs = mstmm_sweep_generic6_forward_outputs,
-        .ir_hash = "6498ee170791eb981a4a083b867e2e0aee6ba3408443af27b63d5030ece97923",
+        .ir_hash = "91998ed65ac3c21cd85918d7c3e9939cb19f4e21e4286beb648c84aa95867dc2",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -17660,7 +17660,7 @@ static const mstmm_kernel mstmm_sweep_generic6_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic6_factor_inputs,
         .outputs = mstmm_sweep_generic6_factor_outputs,
-        .ir_hash = "fcf4d80cc1a3d725504ce128de06030cbaa2ca8398bf5473bf5208e2d98ee5ac",
+        .ir_hash = "b5314e4379c84a1d9263421b67bb40bdf09f4b404e751bc0c8d6b1b8f6129e2c",
         .n_guards = 12,
         .guards = mstmm_sweep_generic6_factor_guards,
     },
@@ -17672,7 +17672,7 @@ static const mstmm_kernel mstmm_sweep_generic6_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic6_push_inputs,
         .outputs = mstmm_sweep_generic6_push_outputs,
-        .ir_hash = "08c1c8f702c523d9eefebdd4228affe49ceca939fca3ffd3f42c9a8468e94d41",
+        .ir_hash = "773c5faca2d984d27648b005f06e9f56cbaf58968ce78431e979c3b4ca697442",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -17684,7 +17684,7 @@ static const mstmm_kernel mstmm_sweep_generic6_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic6_answer_inputs,
         .outputs = mstmm_sweep_generic6_answer_outputs,
-        .ir_hash = "ef1d605d6fa7addbf8e5fe454d734340b9f3a472cd040810ebf556b80e3a9778",
+        .ir_hash = "d2a8cc3aec0fe9c3f9e0fb3cc53174bb2a1bf2218c32cdb4c0ae87b0de230ae1",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -17696,7 +17696,7 @@ static const mstmm_kernel mstmm_sweep_generic6_kernels[] = {
         .n_outputs = 5,
         .inputs = mstmm_sweep_generic6_qr_eliminate_inputs,
         .outputs = mstmm_sweep_generic6_qr_eliminate_outputs,
-        .ir_hash = "4ef17bd0162ab8eb8db87bf2df0441f2e0839c2c2c8ac1075e4ca78ebeffb7ba",
+        .ir_hash = "b485fb3eda4987fcbf25cedc496561a51db67596871b96775d8952f17c5142b4",
         .n_guards = 12,
         .guards = mstmm_sweep_generic6_qr_eliminate_guards,
     },
@@ -17720,7 +17720,7 @@ static const mstmm_kernel mstmm_sweep_generic6_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic6_tangent_column_inputs,
         .outputs = mstmm_sweep_generic6_tangent_column_outputs,
-        .ir_hash = "d1fa610df5590e15f680c8d3afa6f628fcc92849da92a6323bfbc6096c2195f4",
+        .ir_hash = "7521769fcf0536cde85133c44ff781c26f6ba1187690e6ede465a7c631e61746",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -17732,7 +17732,7 @@ static const mstmm_kernel mstmm_sweep_generic6_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic6_tangent_along_inputs,
         .outputs = mstmm_sweep_generic6_tangent_along_outputs,
-        .ir_hash = "4a7a4d1e4adbfc0d2647f8812e221b1035047f62f09fbc91f3fb106e319f1d31",
+        .ir_hash = "8ab98fa3ac2aa7c8312412586bd0e93fbe4d163ef770779dd3c063d19835dce0",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -17744,7 +17744,7 @@ static const mstmm_kernel mstmm_sweep_generic6_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic6_tangent_steady_inputs,
         .outputs = mstmm_sweep_generic6_tangent_steady_outputs,
-        .ir_hash = "2048d246a2ea7271234b2a10960da19451ac246d7ff2403a4500bf7ec9d2e535",
+        .ir_hash = "24bdabe22a0ca6e9d7755287e88bd8efce5b04080c80e0e5159828218c858929",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -17756,7 +17756,7 @@ static const mstmm_kernel mstmm_sweep_generic6_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic6_tangent_turning_inputs,
         .outputs = mstmm_sweep_generic6_tangent_turning_outputs,
-        .ir_hash = "e8c8fe220feee68925969ce249e127cc88106eb62260b0c8462daecb87063c71",
+        .ir_hash = "61ce3df06359633a488acd37a782db7479ad3c2da6bcdfb8ee7d95d893cdb45b",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -17768,7 +17768,7 @@ static const mstmm_kernel mstmm_sweep_generic6_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_sweep_generic6_tangent_rows_inputs,
         .outputs = mstmm_sweep_generic6_tangent_rows_outputs,
-        .ir_hash = "c999d1882ee8541e41109667953e9a630034dae0de30714d70a5303d8f363131",
+        .ir_hash = "440932161a784f088dcfc9a369d9139dab57b434052754cc6be3db566aba8ef1",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -17780,7 +17780,7 @@ static const mstmm_kernel mstmm_sweep_generic6_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_generic6_tangent_reduce_inputs,
         .outputs = mstmm_sweep_generic6_tangent_reduce_outputs,
-        .ir_hash = "11f1ec7f5894bb8deeb50e2bb2ff21e465ac56575a39809d23780e11f5a3c758",
+        .ir_hash = "4810eff2e56ffda43fd3e2834bebe7e94297af582c796718755fd6bb1e5962d8",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -17792,7 +17792,7 @@ static const mstmm_kernel mstmm_sweep_generic6_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic6_tangent_push_inputs,
         .outputs = mstmm_sweep_generic6_tangent_push_outputs,
-        .ir_hash = "d4571a3c3405cfe5e82ca222fb38953da7bd78b9640e142b57606d7b02a097ec",
+        .ir_hash = "b86176262022c4950e3929111bfe25af02669f35c7fc5b0e0b965ae1c66c7337",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -17804,7 +17804,7 @@ static const mstmm_kernel mstmm_sweep_generic6_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic6_tangent_answer_inputs,
         .outputs = mstmm_sweep_generic6_tangent_answer_outputs,
-        .ir_hash = "80ebb420d417e68dc8cdede0c328ab46484e16787ff901cb7bf195dc20e210df",
+        .ir_hash = "98c21cf9ee0dc7dd02020cbebf7529230ee844237c69851118ddff1485838f6f",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -17816,7 +17816,7 @@ static const mstmm_kernel mstmm_sweep_generic6_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic6_tangent_push_known_inputs,
         .outputs = mstmm_sweep_generic6_tangent_push_known_outputs,
-        .ir_hash = "7971eb7c9948d1dd32b68ea940aa56e9fd7aadf94fd50222279abe2eb493b4e0",
+        .ir_hash = "338396a45ebfe0a488497e40c66fbf2b128ac96b5fa1f2fa455d412e21575635",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -17828,7 +17828,7 @@ static const mstmm_kernel mstmm_sweep_generic6_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_generic6_tangent_answer_known_inputs,
         .outputs = mstmm_sweep_generic6_tangent_answer_known_outputs,
-        .ir_hash = "50ee9e9611cb5b01fc05ab0816a9693a0d937a246acd42c87ddfaa700e55aa7d",
+        .ir_hash = "9d7272380ad6ce622bd3f378c4edc2e2c84b18c56ef26b5fbb0006cc132918ab",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -17840,7 +17840,7 @@ static const mstmm_kernel mstmm_sweep_generic6_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_generic6_complement_inputs,
         .outputs = mstmm_sweep_generic6_complement_outputs,
-        .ir_hash = "688d03dbda83940f64996397e9305d9031747265626bd31e0b015f633e313c6c",
+        .ir_hash = "82674d6ce63d258aa9298801be9f653af1ef082611d0d7204a312c63cc5d2e44",
         .n_guards = 6,
         .guards = mstmm_sweep_generic6_complement_guards,
     },
@@ -17876,7 +17876,7 @@ static const mstmm_kernel mstmm_sweep_generic6_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_generic6_answered_inputs,
         .outputs = mstmm_sweep_generic6_answered_outputs,
-        .ir_hash = "97d2f8a94e0726d02be406b002faea5cf6dd681195ef57f01b0dba92ea07138d",
+        .ir_hash = "81713848e5ce2722fe4fca651a3c309a72ad9e999e058f6ed675223024c8d879",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -17888,7 +17888,7 @@ static const mstmm_kernel mstmm_sweep_generic6_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_generic6_pull_inputs,
         .outputs = mstmm_sweep_generic6_pull_outputs,
-        .ir_hash = "14d7a1e78e434c40352a5f092543d48dfa1bf944c7e013b989433487270d301d",
+        .ir_hash = "bbe26e7ae8bd00df10003e8e43ea520063d46f37901e525f4cda1b4867166bf1",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -17900,7 +17900,7 @@ static const mstmm_kernel mstmm_sweep_generic6_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_generic6_exerted_inputs,
         .outputs = mstmm_sweep_generic6_exerted_outputs,
-        .ir_hash = "516ebe71bee5bdd15a49547ae92332188b6a5fa01e3de42a10ec28b6dc1f6cc9",
+        .ir_hash = "ec8bc8e9def6f8a5b3bdd5e4d2d2c224d2e985617a86c64c0898090f014008fe",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -17912,7 +17912,7 @@ static const mstmm_kernel mstmm_sweep_generic6_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_generic6_push_on_ground_inputs,
         .outputs = mstmm_sweep_generic6_push_on_ground_outputs,
-        .ir_hash = "8b9da5d9209e9978748e2cc8e9b5e7494fde7d38603f937c04af1897f7d005d3",
+        .ir_hash = "0e89c8879099542ae75e796b52470232619a6a973ad876392eb384de7a9c0f44",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -17982,7 +17982,7 @@ const mstmm_element mstmm_sweep_generic6 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic6",
-    .hash = "bb3033b43878b2c9471d2cfb1e34481329fae4c8c862726f2551b1503bee8f82",
+    .hash = "25f2e4564b18a7eb36fa7cc1800e9c5357edf5c3f75b26131b2734daf30ed2fa",
     .nq = 0,
     .nu = 0,
     .np = 0,

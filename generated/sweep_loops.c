@@ -98,14 +98,14 @@ int mstmm_sweep_loops_rolling_drift_slope(const real *restrict p, const real *re
     const real *restrict slip, const real *restrict d_R_C, const real *restrict d_slip,
     real *restrict d_drift);
 
-/* the two sides of a hinge that closes a loop
+/* the two sides of a cut hinge
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  A_C[3][3] rotation, axes of C to inertial axes
  * in  x_C[3] (m) origin of C, inertial axes
  * in  A_B[3][3] rotation, axes of B to inertial axes
  * in  x_B[3] (m) P of B, inertial axes
- * in  r_e[3] (m) the end of B that the hinge holds, from P, axes of B
+ * in  r_e[3] (m) end of B at the hinge, from P, axes of B
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * out R_C[3][3] rotation, axes of C to axes of B
@@ -256,13 +256,13 @@ static const mstmm_port mstmm_sweep_loops_meet_outputs[] = {
     {"d", 3, "m", 0, 0},
 };
 
-/* gap of a hinge that closes a loop
+/* position gap of a cut hinge
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  R_e[3][3] rotation, axes of C to axes of B where the loop is closed
  * in  R_C[3][3] rotation, axes of C to axes of B
  * in  d[3] (m) that end from the origin of C, axes of C
- * out gap[6] (m, rad) gap, axes of C
+ * out gap[6] (m, rad) position gap, axes of C
  */
 int mstmm_sweep_loops_gap(const real *restrict R_e, const real *restrict R_C,
     const real *restrict d, real *restrict gap)
@@ -349,11 +349,11 @@ static const mstmm_port mstmm_sweep_loops_gap_outputs[] = {
     {"gap", 6, "m, rad", 0, 0},
 };
 
-/* slip of a hinge that closes a loop
+/* velocity error of a cut hinge
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  R_C[3][3] rotation, axes of C to axes of B
- * in  r_e[3] (m) the end of B that the hinge holds, from P, axes of B
+ * in  r_e[3] (m) end of B at the hinge, from P, axes of B
  * in  d[3] (m) that end from the origin of C, axes of C
  * in  v_C[3] (m/s) velocity of C, own axes
  * in  w_C[3] (rad/s) angular velocity of C, own axes
@@ -454,16 +454,16 @@ static const mstmm_port mstmm_sweep_loops_slip_outputs[] = {
     {"slip", 6, "", 0, 0},
 };
 
-/* drift of a hinge that closes a loop
+/* drift of a cut hinge
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  R_C[3][3] rotation, axes of C to axes of B
- * in  r_e[3] (m) the end of B that the hinge holds, from P, axes of B
+ * in  r_e[3] (m) end of B at the hinge, from P, axes of B
  * in  d[3] (m) that end from the origin of C, axes of C
  * in  slip[6] rate of d and relative angular velocity, axes of C
  * in  motion_C[9] bias motion of C: w, wd, rdd, own axes
  * in  motion_B[9] bias motion of B: w, wd, rdd, own axes
- * out drift[6] rate of the slip in the bias motion, axes of C
+ * out drift[6] rate of the velocity error in the bias motion, axes of C
  */
 int mstmm_sweep_loops_drift(const real *restrict R_C, const real *restrict r_e,
     const real *restrict d, const real *restrict slip, const real *restrict motion_C,
@@ -641,10 +641,10 @@ static const mstmm_port mstmm_sweep_loops_drift_outputs[] = {
     {"drift", 6, "", 0, 0},
 };
 
-/* accelerations that close a gap in a step
+/* accelerations that remove a position gap in a step
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
- * in  gap[6] gap, axes of C
+ * in  gap[6] position gap, axes of C
  * in  rate[1] (1/s^2) accelerations by changes of coordinates
  * out relative[6] motion of the end of B relative to C
  */
@@ -681,12 +681,12 @@ static const mstmm_port mstmm_sweep_loops_closing_outputs[] = {
     {"relative", 6, "", 0, 0},
 };
 
-/* row of a direction of a hinge that closes a loop
+/* row of a direction of a cut hinge
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  w[6] the direction: a row of W
  * in  R_C[3][3] rotation, axes of C to axes of B
- * in  r_e[3] (m) the end of B that the hinge holds, from P, axes of B
+ * in  r_e[3] (m) end of B at the hinge, from P, axes of B
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r_A[3] (m) the end of B from P of A, axes of A
  * out J_A[6] row by the acceleration of A, at its P
@@ -817,12 +817,12 @@ static const mstmm_port mstmm_sweep_loops_row_outputs[] = {
     {"J_B", 6, "", 0, 0},
 };
 
-/* known parts of the rows of a hinge that closes a loop
+/* known parts of the rows of a cut hinge
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
- * in  W[6][6] rows: H^+, then what the hinge holds
+ * in  W[6][6] rows: H^+, then the constrained directions
  * in  relative[6] motion of the end of B relative to C
- * out l[6] rows of what is known
+ * out l[6] known parts of the rows
  */
 int mstmm_sweep_loops_known(const real *restrict W, const real *restrict relative, real *restrict l)
 {
@@ -916,12 +916,12 @@ static const mstmm_port mstmm_sweep_loops_known_outputs[] = {
     {"l", 6, "", 0, 0},
 };
 
-/* acceleration along a direction of a hinge that closes a loop
+/* acceleration along a direction of a cut hinge
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  J_A[6] row by the acceleration of A, at its P
  * in  J_B[6] row by the acceleration of B, at its P
- * in  l[1] row of what is known
+ * in  l[1] known part of the row
  * in  delta_A[6] deviation of the acceleration of A
  * in  delta_B[6] deviation of the acceleration of B
  * out c[1] acceleration along the direction
@@ -979,7 +979,7 @@ static const mstmm_port mstmm_sweep_loops_told_outputs[] = {
 /* load of an effort
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
- * in  J[6] load of an effort of one
+ * in  J[6] load of a unit effort
  * in  tau[1] (N, N*m) effort
  * out e[6] (N, N*m) force part of f = S a + e, added to what is there
  */
@@ -1021,12 +1021,12 @@ static const mstmm_port mstmm_sweep_loops_act_outputs[] = {
     {"e", 6, "N, N*m", 1, 0},
 };
 
-/* pivot of a row that closes
+/* pivot of an eliminated row
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  L[1] the row's own entry of L
  * in  floor[1] largest pivot that is rounding
- * out inverse[1] 1 / L_rr, zero where nothing moves the row
+ * out inverse[1] 1 / L_rr, zero where no motion affects the row
  */
 int mstmm_sweep_loops_settle(const real *restrict L, const real *restrict floor_,
     real *restrict inverse)
@@ -1053,12 +1053,12 @@ static const mstmm_port mstmm_sweep_loops_settle_outputs[] = {
     {"inverse", 1, "", 0, 0},
 };
 
-/* a row closed where its ends meet
+/* a row eliminated where its ends meet
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
- * in  inverse[1] 1 / L_rr, zero where nothing moves the row
- * in  K[6] column of the row, at P of the body that it is seen from
- * in  l[1] what of the row does not go by multipliers or motion
+ * in  inverse[1] 1 / L_rr, zero where no motion affects the row
+ * in  K[6] column of the row, at P of its current body
+ * in  l[1] part of the row independent of multipliers and motion
  * out S[21] S of the body, added to what is there
  * out e[6] e of the body, added to what is there
  */
@@ -1145,12 +1145,12 @@ static const mstmm_port mstmm_sweep_loops_close_outputs[] = {
     {"e", 6, "", 1, 0},
 };
 
-/* column of a row that stays while another is closed
+/* column of a remaining row while another is eliminated
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
- * in  inverse[1] 1 / L_rr, zero where nothing moves the row
- * in  K[6] column of the row, at P of the body that it is seen from
- * in  L_p[1] entry of L of the row that closes and another
+ * in  inverse[1] 1 / L_rr, zero where no motion affects the row
+ * in  K[6] column of the row, at P of its current body
+ * in  L_p[1] entry of L of the eliminated row and another
  * out K_p[6] column of row p, added to what is there
  */
 int mstmm_sweep_loops_shed(const real *restrict inverse, const real *restrict K,
@@ -1199,12 +1199,12 @@ static const mstmm_port mstmm_sweep_loops_shed_outputs[] = {
     {"K_p", 6, "", 1, 0},
 };
 
-/* known part of a row that stays while another is closed
+/* known part of a remaining row while another is eliminated
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
- * in  inverse[1] 1 / L_rr, zero where nothing moves the row
- * in  l[1] what of the row does not go by multipliers or motion
- * in  L_p[1] entry of L of the row that closes and another
+ * in  inverse[1] 1 / L_rr, zero where no motion affects the row
+ * in  l[1] part of the row independent of multipliers and motion
+ * in  L_p[1] entry of L of the eliminated row and another
  * out l_p[1] known part of row p, added to what is there
  */
 int mstmm_sweep_loops_shed_known(const real *restrict inverse, const real *restrict l,
@@ -1233,12 +1233,12 @@ static const mstmm_port mstmm_sweep_loops_shed_known_outputs[] = {
     {"l_p", 1, "", 1, 0},
 };
 
-/* two rows that stay while another is closed
+/* two remaining rows while another is eliminated
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
- * in  inverse[1] 1 / L_rr, zero where nothing moves the row
- * in  L_p[1] entry of L of the row that closes and another
- * in  L_q[1] entry of L of the row that closes and the second
+ * in  inverse[1] 1 / L_rr, zero where no motion affects the row
+ * in  L_p[1] entry of L of the eliminated row and another
+ * in  L_q[1] entry of L of the eliminated row and the second
  * out L_pq[1] entry of L of both, added to what is there
  */
 int mstmm_sweep_loops_shed_pair(const real *restrict inverse, const real *restrict L_p,
@@ -1270,8 +1270,8 @@ static const mstmm_port mstmm_sweep_loops_shed_pair_outputs[] = {
 /* multiplier of a row
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
- * in  inverse[1] 1 / L_rr, zero where nothing moves the row
- * in  l[1] what of the row does not go by multipliers or motion
+ * in  inverse[1] 1 / L_rr, zero where no motion affects the row
+ * in  l[1] part of the row independent of multipliers and motion
  * out x[1] (N, N*m) multiplier
  */
 int mstmm_sweep_loops_multiplier(const real *restrict inverse, const real *restrict l,
@@ -1297,11 +1297,11 @@ static const mstmm_port mstmm_sweep_loops_multiplier_outputs[] = {
     {"x", 1, "N, N*m", 0, 0},
 };
 
-/* share of a motion in a multiplier
+/* contribution of a motion to a multiplier
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
- * in  inverse[1] 1 / L_rr, zero where nothing moves the row
- * in  K[6] column of the row, at P of the body that it is seen from
+ * in  inverse[1] 1 / L_rr, zero where no motion affects the row
+ * in  K[6] column of the row, at P of its current body
  * in  delta[6] deviation of the acceleration of the body
  * out x[1] multiplier of row r, added to what is there
  */
@@ -1345,11 +1345,11 @@ static const mstmm_port mstmm_sweep_loops_multiplier_more_outputs[] = {
     {"x", 1, "", 1, 0},
 };
 
-/* share of another row in a multiplier
+/* contribution of another row to a multiplier
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
- * in  inverse[1] 1 / L_rr, zero where nothing moves the row
- * in  L_p[1] entry of L of the row that closes and another
+ * in  inverse[1] 1 / L_rr, zero where no motion affects the row
+ * in  L_p[1] entry of L of the eliminated row and another
  * in  x_p[1] (N, N*m) multiplier of row p
  * out x[1] multiplier of row r, added to what is there
  */
@@ -1383,7 +1383,7 @@ static const mstmm_port mstmm_sweep_loops_multiplier_less_outputs[] = {
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  softness[1] 1 / J of the rotor on the row
- * in  s[1] acceleration of the speed that it turns with
+ * in  s[1] acceleration of its speed
  * in  x[1] (N, N*m) multiplier
  * out l[1] known part of the row, added to what is there
  */
@@ -1415,7 +1415,7 @@ static const mstmm_port mstmm_sweep_loops_yielded_outputs[] = {
 /* load of a multiplier
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
- * in  K[6] column of the row, at P of the body that it is seen from
+ * in  K[6] column of the row, at P of its current body
  * in  x[1] (N, N*m) multiplier
  * out e[6] e of the body, added to what is there
  */
@@ -1451,11 +1451,11 @@ static const mstmm_port mstmm_sweep_loops_loaded_outputs[] = {
     {"e", 6, "", 1, 0},
 };
 
-/* row of a distance that is kept
- * in  p[1] (m) the distance that is kept
+/* row of a distance constraint
+ * in  p[1] (m) prescribed distance
  * in  d[3] (m) that end from the origin of C, axes of C
- * out W[6][6] rows: H^+, then what the hinge holds
- * out gap[6] (m) what the constraint lacks, axes of C
+ * out W[6][6] rows: H^+, then the constrained directions
+ * out gap[6] (m) position gap of the constraint, axes of C
  */
 int mstmm_sweep_loops_distance(const real *restrict p, const real *restrict d, real *restrict W,
     real *restrict gap)
@@ -1540,10 +1540,10 @@ static const mstmm_port mstmm_sweep_loops_distance_outputs[] = {
     {"gap", 6, "m", 0, 0},
 };
 
-/* rate of the row of a distance
+/* rate of the row of a distance constraint
  * in  d[3] (m) that end from the origin of C, axes of C
  * in  slip[6] rate of d and relative angular velocity, axes of C
- * out drift[6] rate of the slip in the bias motion, axes of C, added to what is there
+ * out drift[6] rate of the velocity error in the bias motion, axes of C, added to what is there
  */
 int mstmm_sweep_loops_distance_drift(const real *restrict d, const real *restrict slip,
     real *restrict drift)
@@ -1605,11 +1605,11 @@ static const mstmm_port mstmm_sweep_loops_distance_drift_outputs[] = {
     {"drift", 6, "", 1, 0},
 };
 
-/* row of a point on a plane
+/* row of a point-on-plane constraint
  * in  p[1] (m) height of the plane over C
  * in  d[3] (m) that end from the origin of C, axes of C
- * out W[6][6] rows: H^+, then what the hinge holds
- * out gap[6] (m) what the constraint lacks, axes of C
+ * out W[6][6] rows: H^+, then the constrained directions
+ * out gap[6] (m) position gap of the constraint, axes of C
  */
 int mstmm_sweep_loops_plane(const real *restrict p, const real *restrict d, real *restrict W,
     real *restrict gap)
@@ -1680,8 +1680,8 @@ static const mstmm_port mstmm_sweep_loops_plane_outputs[] = {
  * in  p[5] (m, -) height of the plane over C, radius of the disc, its axis in axes of B (a ball: 0)
  * in  R_C[3][3] rotation, axes of C to axes of B
  * in  d[3] (m) that end from the origin of C, axes of C
- * out W[6][6] rows: H^+, then what the hinge holds
- * out gap[6] (m) what the constraint lacks, axes of C
+ * out W[6][6] rows: H^+, then the constrained directions
+ * out gap[6] (m) position gap of the constraint, axes of C
  */
 int mstmm_sweep_loops_rolling(const real *restrict p, const real *restrict R_C,
     const real *restrict d, real *restrict W, real *restrict gap)
@@ -1796,7 +1796,7 @@ static const mstmm_guard mstmm_sweep_loops_rolling_guards[] = {
  * in  p[5] (m, -) height of the plane over C, radius of the disc, its axis in axes of B (a ball: 0)
  * in  R_C[3][3] rotation, axes of C to axes of B
  * in  slip[6] rate of d and relative angular velocity, axes of C
- * out drift[6] rate of the slip in the bias motion, axes of C, added to what is there
+ * out drift[6] rate of the velocity error in the bias motion, axes of C, added to what is there
  */
 int mstmm_sweep_loops_rolling_drift(const real *restrict p, const real *restrict R_C,
     const real *restrict slip, real *restrict drift)
@@ -1908,7 +1908,7 @@ static const mstmm_port mstmm_sweep_loops_rolling_drift_outputs[] = {
  * in  x_C[3] (m) origin of C, inertial axes
  * in  A_B[3][3] rotation, axes of B to inertial axes
  * in  x_B[3] (m) P of B, inertial axes
- * in  r_e[3] (m) the end of B that the hinge holds, from P, axes of B
+ * in  r_e[3] (m) end of B at the hinge, from P, axes of B
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  d_A_C[3][3] derivative of A_C
@@ -2204,7 +2204,7 @@ static const mstmm_port mstmm_sweep_loops_meet_slope_outputs[] = {
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  R_C[3][3] rotation, axes of C to axes of B
- * in  r_e[3] (m) the end of B that the hinge holds, from P, axes of B
+ * in  r_e[3] (m) end of B at the hinge, from P, axes of B
  * in  d[3] (m) that end from the origin of C, axes of C
  * in  v_C[3] (m/s) velocity of C, own axes
  * in  w_C[3] (rad/s) angular velocity of C, own axes
@@ -2384,7 +2384,7 @@ static const mstmm_port mstmm_sweep_loops_slip_slope_outputs[] = {
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  R_C[3][3] rotation, axes of C to axes of B
- * in  r_e[3] (m) the end of B that the hinge holds, from P, axes of B
+ * in  r_e[3] (m) end of B at the hinge, from P, axes of B
  * in  d[3] (m) that end from the origin of C, axes of C
  * in  slip[6] rate of d and relative angular velocity, axes of C
  * in  motion_C[9] bias motion of C: w, wd, rdd, own axes
@@ -2740,7 +2740,7 @@ static const mstmm_port mstmm_sweep_loops_drift_slope_outputs[] = {
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  w[6] the direction: a row of W
  * in  R_C[3][3] rotation, axes of C to axes of B
- * in  r_e[3] (m) the end of B that the hinge holds, from P, axes of B
+ * in  r_e[3] (m) end of B at the hinge, from P, axes of B
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r_A[3] (m) the end of B from P of A, axes of A
  * in  d_w[6] derivative of w
@@ -2982,7 +2982,7 @@ static const mstmm_port mstmm_sweep_loops_row_slope_outputs[] = {
 /* known and its derivative along a direction
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
- * in  W[6][6] rows: H^+, then what the hinge holds
+ * in  W[6][6] rows: H^+, then the constrained directions
  * in  relative[6] motion of the end of B relative to C
  * in  d_W[6][6] derivative of W
  * in  d_relative[6] derivative of relative
@@ -3158,7 +3158,7 @@ static const mstmm_port mstmm_sweep_loops_known_slope_outputs[] = {
 /* act and its derivative along a direction
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
- * in  J[6] load of an effort of one
+ * in  J[6] load of a unit effort
  * in  tau[1] (N, N*m) effort
  * in  d_J[6] derivative of J
  * in  d_tau[1] (N, N*m) derivative of tau
@@ -3220,7 +3220,7 @@ static const mstmm_port mstmm_sweep_loops_act_slope_outputs[] = {
 /* loaded and its derivative along a direction
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
- * in  K[6] column of the row, at P of the body that it is seen from
+ * in  K[6] column of the row, at P of its current body
  * in  x[1] (N, N*m) multiplier
  * in  d_K[6] derivative of K
  * in  d_x[1] (N, N*m) derivative of x
@@ -3274,7 +3274,7 @@ static const mstmm_port mstmm_sweep_loops_loaded_slope_outputs[] = {
 };
 
 /* distance and its derivative along a direction
- * in  p[1] (m) the distance that is kept
+ * in  p[1] (m) prescribed distance
  * in  d[3] (m) that end from the origin of C, axes of C
  * in  d_d[3] (m) derivative of d
  * out d_W[6][6] derivative of W
@@ -3983,7 +3983,7 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_loops_meet_inputs,
         .outputs = mstmm_sweep_loops_meet_outputs,
-        .ir_hash = "3082a20efb8f764907d5d1b88fc222cef01335ecd879a5302501f4f6917a2bed",
+        .ir_hash = "ecf048e4c674b98c12e77b83391820dd157c22500f4c3583d794304b2610d14c",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -3995,7 +3995,7 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_loops_gap_inputs,
         .outputs = mstmm_sweep_loops_gap_outputs,
-        .ir_hash = "f8f915f977ac47219a8f6497d044e1a4e4cf884a6cca06249463f5fba1d31009",
+        .ir_hash = "cdee38f683d70199722dedd18865db81c6e533c9860bdac2042354848d0e5c83",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4007,7 +4007,7 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_loops_slip_inputs,
         .outputs = mstmm_sweep_loops_slip_outputs,
-        .ir_hash = "56245f480bc2d03488a4ed219912ceb439b75edd9afabf9afa1ca930d07e5ae5",
+        .ir_hash = "22be95c4ad5d355f9a2968fd90cce3df95eba317e1f686628e6909afa71c44b1",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4019,7 +4019,7 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_loops_drift_inputs,
         .outputs = mstmm_sweep_loops_drift_outputs,
-        .ir_hash = "334e3205cda4df42f9b0316227350df0d4cdee8371fbbbd19bc10499d32dc0a7",
+        .ir_hash = "8a297ba9c1afed50e2340c4079b0b003abce0412a8503f9cc3a2d5d34661529d",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4031,7 +4031,7 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_loops_closing_inputs,
         .outputs = mstmm_sweep_loops_closing_outputs,
-        .ir_hash = "8ef788c7a5068469365b6111b2f895ca7ca494dfab3842a44cd19ab10ce37ed4",
+        .ir_hash = "51940bbaec481e2b5eb740e417644ef05d95c5ae837cdfafbcc226563e70e987",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4043,7 +4043,7 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_loops_row_inputs,
         .outputs = mstmm_sweep_loops_row_outputs,
-        .ir_hash = "04db92af832fa69387662d913f4574d60a0e5b08a4eae998394929540ce35691",
+        .ir_hash = "c7845036a8c0fadb0fde7c8bd8ca1208f0eb065c3d66800b9b6dc8bcec7e6335",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4055,7 +4055,7 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_loops_known_inputs,
         .outputs = mstmm_sweep_loops_known_outputs,
-        .ir_hash = "19cfc28fd574aa56ec15d7c79e86010e2294f90cbfef9d79263c8bb99477faba",
+        .ir_hash = "e6217dcc891ac76b3344e6615a8b65ddc36ae61bf0089232b0512e7d21355802",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4067,7 +4067,7 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_loops_told_inputs,
         .outputs = mstmm_sweep_loops_told_outputs,
-        .ir_hash = "b222e52d32478340877e552514bf885b9bc618767d4bc2687707ec85bc44a920",
+        .ir_hash = "894d6e6028ab405fdb0be0fd3a3fc0654e87d7373a8bc7e48f008557dc388c19",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4079,7 +4079,7 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_loops_act_inputs,
         .outputs = mstmm_sweep_loops_act_outputs,
-        .ir_hash = "d00bf2a68ce6bc15d59fa2e1a164ebdaefa233a6df0843d68715754407cd450a",
+        .ir_hash = "54ce2090edc2f5a199c615263d8f2856e6a715d845072c139411eeab771ccf68",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4091,7 +4091,7 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_loops_settle_inputs,
         .outputs = mstmm_sweep_loops_settle_outputs,
-        .ir_hash = "cab91aa6fe166753058a065b2f748455743a85eb24fd840b49789c55fee28f85",
+        .ir_hash = "b0762d5f3cb8e9c7c8a95274a976ecb9bd73a1db422b8ef0a9fd20bbd96007bb",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4103,7 +4103,7 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_loops_close_inputs,
         .outputs = mstmm_sweep_loops_close_outputs,
-        .ir_hash = "4d2fb509f16e27b239384323bb9bb700ee5542e1ccd103cafb316bbd8b7c08b5",
+        .ir_hash = "b52b951a456402113e4ba0ccdfcc9f15dc69afe6c7e628b52743706f8904f51b",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4115,7 +4115,7 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_loops_shed_inputs,
         .outputs = mstmm_sweep_loops_shed_outputs,
-        .ir_hash = "6cd7098f5f4f26ac7614817c313342989936136d6c13c652a7a19461d4f60ac8",
+        .ir_hash = "51d42872b5bb5a727c0d7de367746caae69db64aab0d7c458e13fa78e38314a1",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4127,7 +4127,7 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_loops_shed_known_inputs,
         .outputs = mstmm_sweep_loops_shed_known_outputs,
-        .ir_hash = "7ab12570ca2d1c24d34ed5a50eafa2ddd6b2ea0201f740dfbfe8475029b2f82a",
+        .ir_hash = "22b62e27956f3bab723448806180df0b9f5fc524c34598b07d70207d56416242",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4139,7 +4139,7 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_loops_shed_pair_inputs,
         .outputs = mstmm_sweep_loops_shed_pair_outputs,
-        .ir_hash = "ed2bb08d61ae9fb88b2eadac01c960b55161636afbaf7407c6f6b608d32372bc",
+        .ir_hash = "9cc0e982b68b2463ec5f0bcab91c4b33e1371f548bc7ea1962218c24ea33355b",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4151,7 +4151,7 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_loops_multiplier_inputs,
         .outputs = mstmm_sweep_loops_multiplier_outputs,
-        .ir_hash = "1ed672dd8476a5bbce27f0922b20b7f911f0613f0c95671dc7fbd2c8235ab202",
+        .ir_hash = "6bb5d332dd94bed08c70dd06e1dae93b73e9b544fe123549cbadb0a7f391ac9f",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4163,7 +4163,7 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_loops_multiplier_more_inputs,
         .outputs = mstmm_sweep_loops_multiplier_more_outputs,
-        .ir_hash = "27f445a999e22924434e640e3af9d3ac07772c709000bf9bd5563d208bc9b413",
+        .ir_hash = "f2abb11dccbd104efac75c868a856d8a2e6ae9c7d71d5829e143070b7b38ea2b",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4175,7 +4175,7 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_loops_multiplier_less_inputs,
         .outputs = mstmm_sweep_loops_multiplier_less_outputs,
-        .ir_hash = "8ffed1f597baa472132a511fceb3e7240a744623169baf9dcfea7b904a3802ba",
+        .ir_hash = "0b9dfb83f30d4dbf3becdf109a73e868e7aa941e58a9085ce9b911f6b152b240",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4187,7 +4187,7 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_loops_yielded_inputs,
         .outputs = mstmm_sweep_loops_yielded_outputs,
-        .ir_hash = "baaae1f5fc4da35685307e2a7b399631d64e8f5994e34c7bf54b7d71f1494e5d",
+        .ir_hash = "5062e0552b6c9f32b29e7bde298472533560d3cefdadfa62ebbd7d39f2c28c31",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4199,7 +4199,7 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_loops_loaded_inputs,
         .outputs = mstmm_sweep_loops_loaded_outputs,
-        .ir_hash = "e75ab51de6fa08624c556f06cc6ed895c4f76d44e3864a1806062807940e7c1a",
+        .ir_hash = "8155c191d79636521e17ace9af4059cdce9d0f7d18f59e8d66c0eeb79277af4b",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4211,7 +4211,7 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_loops_distance_inputs,
         .outputs = mstmm_sweep_loops_distance_outputs,
-        .ir_hash = "d3e43424a6952a98737b6c39df274dc776bb767f2381e3a99ee92a41be10bef5",
+        .ir_hash = "950b07b76c54ef3665f4f5506096956b86c680152d2447d37b368a5b6cfa8cde",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4223,7 +4223,7 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_loops_distance_drift_inputs,
         .outputs = mstmm_sweep_loops_distance_drift_outputs,
-        .ir_hash = "780e1802a1e7773edb96cd8b971cad8f7f43c5e0149f0108f5ea0e3a88655ffa",
+        .ir_hash = "27b2cec6d9070677d4c987f804ec0b17f0f556a5ffb1d212695e5510cfab85b5",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4235,7 +4235,7 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_loops_plane_inputs,
         .outputs = mstmm_sweep_loops_plane_outputs,
-        .ir_hash = "3ef5783ebcc52b6bcda9329197bdd04073e1cc767cd12e0da606f55ca92a60d9",
+        .ir_hash = "98c5db8c311b5a7a0aa9ab0fb7acd09c6ec7cc4fd012c767c5748b0d9c38f31c",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4247,7 +4247,7 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_loops_rolling_inputs,
         .outputs = mstmm_sweep_loops_rolling_outputs,
-        .ir_hash = "a1ff2f6ad76f95733d26e4fd587463918a12dc8f9c4a74b87f221473bfe57403",
+        .ir_hash = "a048176a199f70e1df67b6e135ab0cdabb98e45909b9c07a3c75e5058385c958",
         .n_guards = 1,
         .guards = mstmm_sweep_loops_rolling_guards,
     },
@@ -4259,7 +4259,7 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_loops_rolling_drift_inputs,
         .outputs = mstmm_sweep_loops_rolling_drift_outputs,
-        .ir_hash = "16c505815ca9753482fe486212c64705e862e3c82bc8e70b9370ab7a7b0215d3",
+        .ir_hash = "552892fb912d9e893e8a26d0d72c3330c686a333db5f16211777d191b5e0c71f",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4271,7 +4271,7 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_loops_meet_slope_inputs,
         .outputs = mstmm_sweep_loops_meet_slope_outputs,
-        .ir_hash = "4483951d45d0c655fb4401e1744c2b3e088dd7f80d23ca2a9cc7662a6e569b97",
+        .ir_hash = "d62db560b65d07e6dfe443b070ac01daf1173e2a0bee0341948fb01a1cc02b9d",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4283,7 +4283,7 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_loops_slip_slope_inputs,
         .outputs = mstmm_sweep_loops_slip_slope_outputs,
-        .ir_hash = "423da2aa958ec8c67333d1b5f32c4635ba89d940ba6b3f08738aa20909b3298a",
+        .ir_hash = "d686e96ee2635ea323c75c47f8325af060d0c89be3b50a01246dc55a2ef88cae",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4295,7 +4295,7 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_loops_drift_slope_inputs,
         .outputs = mstmm_sweep_loops_drift_slope_outputs,
-        .ir_hash = "d1a2b73b1dd95dc575f8b7d73ca0f8e47e54e4df5e24550fed0482eef184f7f5",
+        .ir_hash = "c2111149101325f7da85dfd14e83e6e86d61f98ab0c54425d671dc1bf4ca9ab1",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4307,7 +4307,7 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_loops_row_slope_inputs,
         .outputs = mstmm_sweep_loops_row_slope_outputs,
-        .ir_hash = "3e906aaaf3fc64ef678d97be1fd2fb38eb4d908cd95b0cdf5734ac6a60358133",
+        .ir_hash = "c114f9e110af27bcb4c461d8f561fb8fc6354b0a53b155549146873e07674ccf",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4319,7 +4319,7 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_loops_known_slope_inputs,
         .outputs = mstmm_sweep_loops_known_slope_outputs,
-        .ir_hash = "e2965391bbd4f0ffa268d9324e02d57b46018df73af003aeb8ffe48549181652",
+        .ir_hash = "30659e38fa1fcbd9d0f4da7d0195acdda91bfd9da1c4653abc2a89c41695a531",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4331,7 +4331,7 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_loops_act_slope_inputs,
         .outputs = mstmm_sweep_loops_act_slope_outputs,
-        .ir_hash = "76d5eb4f8f1057d5f1549b215d42ae0a8416fd19558daf580ca5edbe872e5ec7",
+        .ir_hash = "0f45bbf49e9ed7887a2483dda9bba13519d1f3346407426edbc7506964c54486",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4343,7 +4343,7 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_loops_loaded_slope_inputs,
         .outputs = mstmm_sweep_loops_loaded_slope_outputs,
-        .ir_hash = "05b3a17bc0f74e44cfbc84240a25807b65ec73ec5aad3484d1cccabee4faed8b",
+        .ir_hash = "7db1a03ea48e690a9b8f00add16684cfba5e5d3948e8b334f545da9d4730f745",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4355,7 +4355,7 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_loops_distance_slope_inputs,
         .outputs = mstmm_sweep_loops_distance_slope_outputs,
-        .ir_hash = "d9bb9a513bb4c960d5afbcbd323790328943f2bfd40dcc3193f4978a75062751",
+        .ir_hash = "c14dbb2688a98e5f44d0becd5f83a4b650359ed68214bf22431150c2f22fa2ad",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4413,7 +4413,7 @@ const mstmm_element mstmm_sweep_loops = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "loops",
-    .hash = "eb09e33631f39e6f930409b5cc4c4c937b3ea913ef84aedb3497d17cd9fdd4f1",
+    .hash = "ad4b802a6473d00ea3e208d78a56a9f8f399ae8e5f34c28cb8cf39e8703f1e3e",
     .nq = 0,
     .nu = 0,
     .np = 0,

@@ -214,7 +214,7 @@ int mstmm_solve_ldl(
  * out A[6][n] derivatives of the second moments by the modes
  * out S_ff[n][n] rows and columns of the modes
  * out e[6] (N, N*m) force part of f = S a + e, at P
- * out e_f[n] load that the modes need
+ * out e_f[n] load required by the modes
  */
 static inline __attribute__((always_inline))
 int mstmm_sweep_modal_residual_sized(int n, const real *restrict p, const real *restrict C,
@@ -865,7 +865,7 @@ int mstmm_sweep_modal_residual(int n, const real *restrict p, const real *restri
     const real *restrict etad, const real *restrict motion, real *restrict S, real *restrict S_rf,
     real *restrict A, real *restrict S_ff, real *restrict e, real *restrict e_f)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_sweep_modal_residual_sized(1, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, K, D, eta, etad, motion, S, S_rf, A, S_ff, e, e_f);
     case 2: return mstmm_sweep_modal_residual_sized(2, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, K, D, eta, etad, motion, S, S_rf, A, S_ff, e, e_f);
     case 3: return mstmm_sweep_modal_residual_sized(3, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, K, D, eta, etad, motion, S, S_rf, A, S_ff, e, e_f);
@@ -1362,7 +1362,7 @@ int mstmm_sweep_modal_momentum(int n, const real *restrict p, const real *restri
     const real *restrict w, real *restrict S, real *restrict S_rf, real *restrict A,
     real *restrict h, real *restrict h_f, real *restrict T)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_sweep_modal_momentum_sized(1, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, eta, etad, v, w, S, S_rf, A, h, h_f, T);
     case 2: return mstmm_sweep_modal_momentum_sized(2, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, eta, etad, v, w, S, S_rf, A, h, h_f, T);
     case 3: return mstmm_sweep_modal_momentum_sized(3, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, eta, etad, v, w, S, S_rf, A, h, h_f, T);
@@ -1453,7 +1453,7 @@ int mstmm_sweep_modal_strain_energy_sized(int n, const real *restrict K, const r
 int mstmm_sweep_modal_strain_energy(int n, const real *restrict K, const real *restrict D,
     const real *restrict eta, const real *restrict etad, real *restrict V, real *restrict W_d)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_sweep_modal_strain_energy_sized(1, K, D, eta, etad, V, W_d);
     case 2: return mstmm_sweep_modal_strain_energy_sized(2, K, D, eta, etad, V, W_d);
     case 3: return mstmm_sweep_modal_strain_energy_sized(3, K, D, eta, etad, V, W_d);
@@ -1769,7 +1769,7 @@ int mstmm_sweep_modal_section(int n, const real *restrict r, const real *restric
     real *restrict Phi, real *restrict x, real *restrict Psi, real *restrict xd,
     real *restrict Psid, real *restrict xdd, real *restrict Psidd)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_sweep_modal_section_sized(1, r, phi, theta, g_x, g_y, g_z, h_x, h_y, h_z, eta, etad, Phi, x, Psi, xd, Psid, xdd, Psidd);
     case 2: return mstmm_sweep_modal_section_sized(2, r, phi, theta, g_x, g_y, g_z, h_x, h_y, h_z, eta, etad, Phi, x, Psi, xd, Psid, xdd, Psidd);
     case 3: return mstmm_sweep_modal_section_sized(3, r, phi, theta, g_x, g_y, g_z, h_x, h_y, h_z, eta, etad, Phi, x, Psi, xd, Psid, xdd, Psidd);
@@ -1807,7 +1807,7 @@ static const mstmm_port mstmm_sweep_modal_section_outputs[] = {
     {"Psidd", 3, "rad/s2", 0, 0},
 };
 
-/* end of a flexible body against its floating frame
+/* end of a flexible body relative to its floating frame
  * source: Shabana, Dynamics of Multibody Systems, ch. 5 (floating frame of reference)
  * source: Schwertassek, Wallrapp, Dynamik flexibler Mehrkoerpersysteme (invariants, unit loads)
  * source: Rui, Wang, Zhang, ch. 8 (rigid-flexible systems)
@@ -1836,7 +1836,7 @@ int mstmm_sweep_modal_outward(const real *restrict R_end, const real *restrict x
     const real t3 = t1 + t2;
     const real t4 = t0 + t3;
     const real t5 = t4 < 2.25;
-    if (!(t5 != 0)) return 1; /* a section turns by more than 3/2 rad against its floating frame */
+    if (!(t5 != 0)) return 1; /* a section rotates by more than 3/2 rad relative to its floating frame */
     const real t6 = t4 * 8.896791392450574e-22;
     const real t7 = (-4.110317623312165e-19) + t6;
     const real t8 = t4 * t7;
@@ -2281,10 +2281,10 @@ static const mstmm_port mstmm_sweep_modal_outward_outputs[] = {
 };
 
 static const mstmm_guard mstmm_sweep_modal_outward_guards[] = {
-    {1, "a section turns by more than 3/2 rad against its floating frame"},
+    {1, "a section rotates by more than 3/2 rad relative to its floating frame"},
 };
 
-/* floating frame against the end of the body that is held
+/* floating frame relative to the supported end of the body
  * source: Shabana, Dynamics of Multibody Systems, ch. 5 (floating frame of reference)
  * source: Schwertassek, Wallrapp, Dynamik flexibler Mehrkoerpersysteme (invariants, unit loads)
  * source: Rui, Wang, Zhang, ch. 8 (rigid-flexible systems)
@@ -2313,7 +2313,7 @@ int mstmm_sweep_modal_inward(const real *restrict R_end, const real *restrict x,
     const real t3 = t1 + t2;
     const real t4 = t0 + t3;
     const real t5 = t4 < 2.25;
-    if (!(t5 != 0)) return 1; /* a section turns by more than 3/2 rad against its floating frame */
+    if (!(t5 != 0)) return 1; /* a section rotates by more than 3/2 rad relative to its floating frame */
     const real t6 = t4 * 8.896791392450574e-22;
     const real t7 = (-4.110317623312165e-19) + t6;
     const real t8 = t4 * t7;
@@ -2797,7 +2797,7 @@ static const mstmm_port mstmm_sweep_modal_inward_outputs[] = {
 };
 
 static const mstmm_guard mstmm_sweep_modal_inward_guards[] = {
-    {1, "a section turns by more than 3/2 rad against its floating frame"},
+    {1, "a section rotates by more than 3/2 rad relative to its floating frame"},
 };
 
 /* subspace of a port
@@ -2902,7 +2902,7 @@ int mstmm_sweep_modal_subspace_sized(int n, const real *restrict H6, const real 
 int mstmm_sweep_modal_subspace(int n, const real *restrict H6, const real *restrict Phi,
     real *restrict H)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_sweep_modal_subspace_sized(1, H6, Phi, H);
     case 2: return mstmm_sweep_modal_subspace_sized(2, H6, Phi, H);
     case 3: return mstmm_sweep_modal_subspace_sized(3, H6, Phi, H);
@@ -2986,7 +2986,7 @@ int mstmm_sweep_modal_imposed_sized(int n, const real *restrict H, const real *r
 int mstmm_sweep_modal_imposed(int n, const real *restrict H, const real *restrict s,
     const real *restrict c, real *restrict c_s)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_sweep_modal_imposed_sized(1, H, s, c, c_s);
     case 2: return mstmm_sweep_modal_imposed_sized(2, H, s, c, c_s);
     case 3: return mstmm_sweep_modal_imposed_sized(3, H, s, c, c_s);
@@ -3010,7 +3010,7 @@ static const mstmm_port mstmm_sweep_modal_imposed_outputs[] = {
     {"c_s", 6, "", 0, 0},
 };
 
-/* S and e of a port, seen by the modes
+/* S and e of a port along the modes
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -3021,7 +3021,7 @@ static const mstmm_port mstmm_sweep_modal_imposed_outputs[] = {
  * out U[6][n] S H
  * out S_rf[6][n] rows of the frame, columns of the modes: [Ct; Gt], added to what is there
  * out S_ff[n][n] rows and columns of the modes, added to what is there
- * out e_f[n] load that the modes need, added to what is there
+ * out e_f[n] load required by the modes, added to what is there
  */
 static inline __attribute__((always_inline))
 int mstmm_sweep_modal_absorb_sized(int n, const real *restrict Rc, const real *restrict r,
@@ -3242,7 +3242,7 @@ int mstmm_sweep_modal_absorb(int n, const real *restrict Rc, const real *restric
     const real *restrict H, const real *restrict S, const real *restrict e, real *restrict U,
     real *restrict S_rf, real *restrict S_ff, real *restrict e_f)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_sweep_modal_absorb_sized(1, Rc, r, H, S, e, U, S_rf, S_ff, e_f);
     case 2: return mstmm_sweep_modal_absorb_sized(2, Rc, r, H, S, e, U, S_rf, S_ff, e_f);
     case 3: return mstmm_sweep_modal_absorb_sized(3, Rc, r, H, S, e, U, S_rf, S_ff, e_f);
@@ -3271,7 +3271,7 @@ static const mstmm_port mstmm_sweep_modal_absorb_outputs[] = {
     {"e_f", 1, "", 1, 1},
 };
 
-/* frame followed from the section that is held
+/* frame relative to the supported section
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  H[6][n] motion subspace of the modes, rows v then w, outboard axes
@@ -3280,7 +3280,7 @@ static const mstmm_port mstmm_sweep_modal_absorb_outputs[] = {
  * in  S_rf[6][n] rows of the frame, columns of the modes: [Ct; Gt]
  * out S_rf_I[6][n] S_rf + S H
  * out S_ff[n][n] rows and columns of the modes, added to what is there
- * out e_f[n] load that the modes need, added to what is there
+ * out e_f[n] load required by the modes, added to what is there
  */
 static inline __attribute__((always_inline))
 int mstmm_sweep_modal_rebase_sized(int n, const real *restrict H, const real *restrict S,
@@ -3426,7 +3426,7 @@ int mstmm_sweep_modal_rebase(int n, const real *restrict H, const real *restrict
     const real *restrict e, const real *restrict S_rf, real *restrict S_rf_I, real *restrict S_ff,
     real *restrict e_f)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_sweep_modal_rebase_sized(1, H, S, e, S_rf, S_rf_I, S_ff, e_f);
     case 2: return mstmm_sweep_modal_rebase_sized(2, H, S, e, S_rf, S_rf_I, S_ff, e_f);
     case 3: return mstmm_sweep_modal_rebase_sized(3, H, S, e, S_rf, S_rf_I, S_ff, e_f);
@@ -3460,7 +3460,7 @@ static const mstmm_port mstmm_sweep_modal_rebase_outputs[] = {
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  S_rf[6][n] rows of the frame, columns of the modes: [Ct; Gt]
  * in  S_ff[n][n] rows and columns of the modes
- * in  e_f[n] load that the modes need
+ * in  e_f[n] load required by the modes
  * out right[n][7] S_fr, e_f
  * out Gg[n][7] etadd = g - G a: columns of G, then -g
  * out S_c[21] S without modes
@@ -3693,7 +3693,7 @@ int mstmm_sweep_modal_condense(int n, const real *restrict S, const real *restri
     real *restrict right, real *restrict Gg, real *restrict S_c, real *restrict e_c,
     real *restrict work)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_sweep_modal_condense_sized(1, S, e, S_rf, S_ff, e_f, right, Gg, S_c, e_c, work);
     case 2: return mstmm_sweep_modal_condense_sized(2, S, e, S_rf, S_ff, e_f, right, Gg, S_c, e_c, work);
     case 3: return mstmm_sweep_modal_condense_sized(3, S, e, S_rf, S_ff, e_f, right, Gg, S_c, e_c, work);
@@ -3760,7 +3760,7 @@ int mstmm_sweep_modal_recover_sized(int n, const real *restrict Gg, const real *
 int mstmm_sweep_modal_recover(int n, const real *restrict Gg, const real *restrict delta_I,
     real *restrict etadd)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_sweep_modal_recover_sized(1, Gg, delta_I, etadd);
     case 2: return mstmm_sweep_modal_recover_sized(2, Gg, delta_I, etadd);
     case 3: return mstmm_sweep_modal_recover_sized(3, Gg, delta_I, etadd);
@@ -3843,7 +3843,7 @@ int mstmm_sweep_modal_displaced_sized(int n, const real *restrict H, const real 
 int mstmm_sweep_modal_displaced(int n, const real *restrict H, const real *restrict etadd,
     const real *restrict delta_I, real *restrict delta)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_sweep_modal_displaced_sized(1, H, etadd, delta_I, delta);
     case 2: return mstmm_sweep_modal_displaced_sized(2, H, etadd, delta_I, delta);
     case 3: return mstmm_sweep_modal_displaced_sized(3, H, etadd, delta_I, delta);
@@ -3874,7 +3874,7 @@ static const mstmm_port mstmm_sweep_modal_displaced_outputs[] = {
  * in  S_ff[n][n] rows and columns of the modes
  * in  s[n] prescribed modal accelerations
  * out e[6] (N, N*m) force part of f = S a + e, at P, added to what is there
- * out e_f[n] load that the modes need, added to what is there
+ * out e_f[n] load required by the modes, added to what is there
  */
 static inline __attribute__((always_inline))
 int mstmm_sweep_modal_prescribed_sized(int n, const real *restrict S_rf, const real *restrict S_ff,
@@ -3930,7 +3930,7 @@ int mstmm_sweep_modal_prescribed_sized(int n, const real *restrict S_rf, const r
 int mstmm_sweep_modal_prescribed(int n, const real *restrict S_rf, const real *restrict S_ff,
     const real *restrict s, real *restrict e, real *restrict e_f)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_sweep_modal_prescribed_sized(1, S_rf, S_ff, s, e, e_f);
     case 2: return mstmm_sweep_modal_prescribed_sized(2, S_rf, S_ff, s, e, e_f);
     case 3: return mstmm_sweep_modal_prescribed_sized(3, S_rf, S_ff, s, e, e_f);
@@ -3960,7 +3960,7 @@ static const mstmm_port mstmm_sweep_modal_prescribed_outputs[] = {
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  H[6][n] motion subspace of the modes, rows v then w, outboard axes
  * in  e[6] (N, N*m) force part of f = S a + e, at P
- * in  e_f[n] load that the modes need
+ * in  e_f[n] load required by the modes
  * out tau[n] efforts on the modes
  */
 static inline __attribute__((always_inline))
@@ -3988,7 +3988,7 @@ int mstmm_sweep_modal_modal_effort_sized(int n, const real *restrict H, const re
 int mstmm_sweep_modal_modal_effort(int n, const real *restrict H, const real *restrict e,
     const real *restrict e_f, real *restrict tau)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_sweep_modal_modal_effort_sized(1, H, e, e_f, tau);
     case 2: return mstmm_sweep_modal_modal_effort_sized(2, H, e, e_f, tau);
     case 3: return mstmm_sweep_modal_modal_effort_sized(3, H, e, e_f, tau);
@@ -4017,7 +4017,7 @@ static const mstmm_port mstmm_sweep_modal_modal_effort_outputs[] = {
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Gg[n][7] etadd = g - G a: columns of G, then -g
  * in  e[6] (N, N*m) force part of f = S a + e, at P
- * in  e_f[n] load that the modes need
+ * in  e_f[n] load required by the modes
  * out e_c[6] (N, N*m) e without modes
  */
 static inline __attribute__((always_inline))
@@ -4072,7 +4072,7 @@ int mstmm_sweep_modal_pushed_sized(int n, const real *restrict Gg, const real *r
 int mstmm_sweep_modal_pushed(int n, const real *restrict Gg, const real *restrict e,
     const real *restrict e_f, real *restrict e_c)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_sweep_modal_pushed_sized(1, Gg, e, e_f, e_c);
     case 2: return mstmm_sweep_modal_pushed_sized(2, Gg, e, e_f, e_c);
     case 3: return mstmm_sweep_modal_pushed_sized(3, Gg, e, e_f, e_c);
@@ -4096,11 +4096,11 @@ static const mstmm_port mstmm_sweep_modal_pushed_outputs[] = {
     {"e_c", 6, "N, N*m", 0, 0},
 };
 
-/* modal accelerations that answer a load
+/* modal accelerations due to a load
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  S_ff[n][n] rows and columns of the modes
- * in  e_f[n] load that the modes need
+ * in  e_f[n] load required by the modes
  * in  Gg[n][7] etadd = g - G a: columns of G, then -g
  * in  delta_I[6] deviation of the frame without the modes' part
  * out y[n] S_ff^-1 e_f
@@ -4137,7 +4137,7 @@ int mstmm_sweep_modal_answer(int n, const real *restrict S_ff, const real *restr
     const real *restrict Gg, const real *restrict delta_I, real *restrict y, real *restrict etadd,
     real *restrict work)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_sweep_modal_answer_sized(1, S_ff, e_f, Gg, delta_I, y, etadd, work);
     case 2: return mstmm_sweep_modal_answer_sized(2, S_ff, e_f, Gg, delta_I, y, etadd, work);
     case 3: return mstmm_sweep_modal_answer_sized(3, S_ff, e_f, Gg, delta_I, y, etadd, work);
@@ -4196,7 +4196,7 @@ int mstmm_sweep_modal_stiffened_sized(int n, const real *restrict K, const real 
 int mstmm_sweep_modal_stiffened(int n, const real *restrict K, const real *restrict D,
     const real *restrict rate, const real *restrict sq, real *restrict S_ff)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_sweep_modal_stiffened_sized(1, K, D, rate, sq, S_ff);
     case 2: return mstmm_sweep_modal_stiffened_sized(2, K, D, rate, sq, S_ff);
     case 3: return mstmm_sweep_modal_stiffened_sized(3, K, D, rate, sq, S_ff);
@@ -4228,7 +4228,7 @@ static const mstmm_port mstmm_sweep_modal_stiffened_outputs[] = {
  * in  D[n][n] damping
  * in  eta[n] modal coordinates
  * in  etad[n] modal speeds
- * out e_f[n] load that the modes need, added to what is there
+ * out e_f[n] load required by the modes, added to what is there
  */
 static inline __attribute__((always_inline))
 int mstmm_sweep_modal_strained_sized(int n, const real *restrict K, const real *restrict D,
@@ -4254,7 +4254,7 @@ int mstmm_sweep_modal_strained_sized(int n, const real *restrict K, const real *
 int mstmm_sweep_modal_strained(int n, const real *restrict K, const real *restrict D,
     const real *restrict eta, const real *restrict etad, real *restrict e_f)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_sweep_modal_strained_sized(1, K, D, eta, etad, e_f);
     case 2: return mstmm_sweep_modal_strained_sized(2, K, D, eta, etad, e_f);
     case 3: return mstmm_sweep_modal_strained_sized(3, K, D, eta, etad, e_f);
@@ -4309,7 +4309,7 @@ int mstmm_sweep_modal_row_felt_sized(int n, const real *restrict H, const real *
 int mstmm_sweep_modal_row_felt(int n, const real *restrict H, const real *restrict K,
     real *restrict K_f)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_sweep_modal_row_felt_sized(1, H, K, K_f);
     case 2: return mstmm_sweep_modal_row_felt_sized(2, H, K, K_f);
     case 3: return mstmm_sweep_modal_row_felt_sized(3, H, K, K_f);
@@ -4405,7 +4405,7 @@ int mstmm_sweep_modal_row_condensed(int n, const real *restrict S_ff, const real
     const real *restrict Gg, real *restrict Y, real *restrict K, real *restrict l_,
     real *restrict work)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_sweep_modal_row_condensed_sized(1, S_ff, K_f, Gg, Y, K, l_, work);
     case 2: return mstmm_sweep_modal_row_condensed_sized(2, S_ff, K_f, Gg, Y, K, l_, work);
     case 3: return mstmm_sweep_modal_row_condensed_sized(3, S_ff, K_f, Gg, Y, K, l_, work);
@@ -4458,7 +4458,7 @@ int mstmm_sweep_modal_row_coupled_sized(int n, const real *restrict K_f, const r
 int mstmm_sweep_modal_row_coupled(int n, const real *restrict K_f, const real *restrict Y,
     real *restrict L_ij)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_sweep_modal_row_coupled_sized(1, K_f, Y, L_ij);
     case 2: return mstmm_sweep_modal_row_coupled_sized(2, K_f, Y, L_ij);
     case 3: return mstmm_sweep_modal_row_coupled_sized(3, K_f, Y, L_ij);
@@ -4502,7 +4502,7 @@ int mstmm_sweep_modal_row_answered_sized(int n, const real *restrict Y, const re
 int mstmm_sweep_modal_row_answered(int n, const real *restrict Y, const real *restrict x,
     real *restrict etadd)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_sweep_modal_row_answered_sized(1, Y, x, etadd);
     case 2: return mstmm_sweep_modal_row_answered_sized(2, Y, x, etadd);
     case 3: return mstmm_sweep_modal_row_answered_sized(3, Y, x, etadd);
@@ -5682,7 +5682,7 @@ int mstmm_sweep_modal_residual_slope(int n, const real *restrict p, const real *
     const real *restrict d_motion, real *restrict d_S_rf, real *restrict d_A, real *restrict d_e,
     real *restrict d_e_f)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_sweep_modal_residual_slope_sized(1, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, K, D, eta, etad, motion, S_rf, A, d_eta, d_etad, d_motion, d_S_rf, d_A, d_e, d_e_f);
     case 2: return mstmm_sweep_modal_residual_slope_sized(2, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, K, D, eta, etad, motion, S_rf, A, d_eta, d_etad, d_motion, d_S_rf, d_A, d_e, d_e_f);
     case 3: return mstmm_sweep_modal_residual_slope_sized(3, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, K, D, eta, etad, motion, S_rf, A, d_eta, d_etad, d_motion, d_S_rf, d_A, d_e, d_e_f);
@@ -6336,7 +6336,7 @@ int mstmm_sweep_modal_momentum_slope(int n, const real *restrict p, const real *
     const real *restrict d_v, const real *restrict d_w, real *restrict d_S_rf, real *restrict d_A,
     real *restrict d_h, real *restrict d_h_f)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_sweep_modal_momentum_slope_sized(1, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, eta, etad, v, w, S_rf, A, h_f, d_eta, d_etad, d_v, d_w, d_S_rf, d_A, d_h, d_h_f);
     case 2: return mstmm_sweep_modal_momentum_slope_sized(2, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, eta, etad, v, w, S_rf, A, h_f, d_eta, d_etad, d_v, d_w, d_S_rf, d_A, d_h, d_h_f);
     case 3: return mstmm_sweep_modal_momentum_slope_sized(3, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, eta, etad, v, w, S_rf, A, h_f, d_eta, d_etad, d_v, d_w, d_S_rf, d_A, d_h, d_h_f);
@@ -6747,7 +6747,7 @@ int mstmm_sweep_modal_section_slope(int n, const real *restrict r, const real *r
     real *restrict d_Phi, real *restrict d_x, real *restrict d_Psi, real *restrict d_xd,
     real *restrict d_Psid, real *restrict d_xdd, real *restrict d_Psidd)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_sweep_modal_section_slope_sized(1, r, phi, theta, g_x, g_y, g_z, h_x, h_y, h_z, eta, etad, Phi, d_eta, d_etad, d_Phi, d_x, d_Psi, d_xd, d_Psid, d_xdd, d_Psidd);
     case 2: return mstmm_sweep_modal_section_slope_sized(2, r, phi, theta, g_x, g_y, g_z, h_x, h_y, h_z, eta, etad, Phi, d_eta, d_etad, d_Phi, d_x, d_Psi, d_xd, d_Psid, d_xdd, d_Psidd);
     case 3: return mstmm_sweep_modal_section_slope_sized(3, r, phi, theta, g_x, g_y, g_z, h_x, h_y, h_z, eta, etad, Phi, d_eta, d_etad, d_Phi, d_x, d_Psi, d_xd, d_Psid, d_xdd, d_Psidd);
@@ -9057,7 +9057,7 @@ int mstmm_sweep_modal_subspace_slope_sized(int n, const real *restrict H6, const
 int mstmm_sweep_modal_subspace_slope(int n, const real *restrict H6, const real *restrict Phi,
     const real *restrict d_H6, const real *restrict d_Phi, real *restrict d_H)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_sweep_modal_subspace_slope_sized(1, H6, Phi, d_H6, d_Phi, d_H);
     case 2: return mstmm_sweep_modal_subspace_slope_sized(2, H6, Phi, d_H6, d_Phi, d_H);
     case 3: return mstmm_sweep_modal_subspace_slope_sized(3, H6, Phi, d_H6, d_Phi, d_H);
@@ -9161,7 +9161,7 @@ int mstmm_sweep_modal_imposed_slope(int n, const real *restrict H, const real *r
     const real *restrict c, const real *restrict d_H, const real *restrict d_s,
     const real *restrict d_c, real *restrict d_c_s)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_sweep_modal_imposed_slope_sized(1, H, s, c, d_H, d_s, d_c, d_c_s);
     case 2: return mstmm_sweep_modal_imposed_slope_sized(2, H, s, c, d_H, d_s, d_c, d_c_s);
     case 3: return mstmm_sweep_modal_imposed_slope_sized(3, H, s, c, d_H, d_s, d_c, d_c_s);
@@ -9267,7 +9267,7 @@ int mstmm_sweep_modal_prescribed_slope(int n, const real *restrict S_rf, const r
     const real *restrict s, const real *restrict d_S_rf, const real *restrict d_s,
     real *restrict d_e, real *restrict d_e_f)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_sweep_modal_prescribed_slope_sized(1, S_rf, S_ff, s, d_S_rf, d_s, d_e, d_e_f);
     case 2: return mstmm_sweep_modal_prescribed_slope_sized(2, S_rf, S_ff, s, d_S_rf, d_s, d_e, d_e_f);
     case 3: return mstmm_sweep_modal_prescribed_slope_sized(3, S_rf, S_ff, s, d_S_rf, d_s, d_e, d_e_f);
@@ -9299,7 +9299,7 @@ static const mstmm_port mstmm_sweep_modal_prescribed_slope_outputs[] = {
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  H[6][n] motion subspace of the modes, rows v then w, outboard axes
  * in  e[6] (N, N*m) force part of f = S a + e, at P
- * in  e_f[n] load that the modes need
+ * in  e_f[n] load required by the modes
  * in  d_H[6][n] derivative of H
  * in  d_e[6] (N, N*m) derivative of e
  * in  d_e_f[n] derivative of e_f
@@ -9345,7 +9345,7 @@ int mstmm_sweep_modal_modal_effort_slope(int n, const real *restrict H, const re
     const real *restrict e_f, const real *restrict d_H, const real *restrict d_e,
     const real *restrict d_e_f, real *restrict d_tau)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_sweep_modal_modal_effort_slope_sized(1, H, e, e_f, d_H, d_e, d_e_f, d_tau);
     case 2: return mstmm_sweep_modal_modal_effort_slope_sized(2, H, e, e_f, d_H, d_e, d_e_f, d_tau);
     case 3: return mstmm_sweep_modal_modal_effort_slope_sized(3, H, e, e_f, d_H, d_e, d_e_f, d_tau);
@@ -9381,7 +9381,7 @@ static const mstmm_kernel mstmm_sweep_modal_kernels[] = {
         .n_outputs = 6,
         .inputs = mstmm_sweep_modal_residual_inputs,
         .outputs = mstmm_sweep_modal_residual_outputs,
-        .ir_hash = "ef5add8415d50f2b36d93fe49ad800f311670439ff8cc52ce62c22308cee729b",
+        .ir_hash = "4294ac21676d77f1343051938646a9166faf3e3931cd8852b8cd0690d9227a79",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -9429,7 +9429,7 @@ static const mstmm_kernel mstmm_sweep_modal_kernels[] = {
         .n_outputs = 6,
         .inputs = mstmm_sweep_modal_outward_inputs,
         .outputs = mstmm_sweep_modal_outward_outputs,
-        .ir_hash = "bb4649c2a9babf4134ae2a7b52dda38f42e5a94ae1f744cbd262b7fe2d630100",
+        .ir_hash = "50c50c723d0ca93d466743ebf35ee19bf35a0ebb03012115488cd46a6feb45f3",
         .n_guards = 1,
         .guards = mstmm_sweep_modal_outward_guards,
     },
@@ -9441,7 +9441,7 @@ static const mstmm_kernel mstmm_sweep_modal_kernels[] = {
         .n_outputs = 6,
         .inputs = mstmm_sweep_modal_inward_inputs,
         .outputs = mstmm_sweep_modal_inward_outputs,
-        .ir_hash = "88995b978bf08c26f6dc578a10da008207378917654868de0db0fad8bf90cdbe",
+        .ir_hash = "80814e37260aec37dde5063a169017ccd2c2f627fce3d6db26d0287319d00b68",
         .n_guards = 1,
         .guards = mstmm_sweep_modal_inward_guards,
     },
@@ -9477,7 +9477,7 @@ static const mstmm_kernel mstmm_sweep_modal_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_sweep_modal_absorb_inputs,
         .outputs = mstmm_sweep_modal_absorb_outputs,
-        .ir_hash = "0c2715d561e0c90eb538de164ac6c539d374ff12a3bf79a756873acc693bb9f3",
+        .ir_hash = "317201b1695764eb8b4c5ff23e04a08f2309d642a7ba5553c42be0302934de64",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -9489,7 +9489,7 @@ static const mstmm_kernel mstmm_sweep_modal_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_modal_rebase_inputs,
         .outputs = mstmm_sweep_modal_rebase_outputs,
-        .ir_hash = "97bf1d8e19004291bf2f16c6fe29d5c0798d0f9e7fe0debc54b2c8ca749695f3",
+        .ir_hash = "c19811da715bcccc9aa4e9b210d1e91837f72ffe85ab5c5cabfd94b1184104ee",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -9501,7 +9501,7 @@ static const mstmm_kernel mstmm_sweep_modal_kernels[] = {
         .n_outputs = 5,
         .inputs = mstmm_sweep_modal_condense_inputs,
         .outputs = mstmm_sweep_modal_condense_outputs,
-        .ir_hash = "104062b9b2b86d8b5fc039afc941fedcfe0d69f0d868f32993a09d5853401bc7",
+        .ir_hash = "d26e8ba53446be1f4d87d582a99095780d808d59c1b42498050200be926aff2f",
         .n_guards = 1,
         .guards = mstmm_sweep_modal_condense_guards,
     },
@@ -9537,7 +9537,7 @@ static const mstmm_kernel mstmm_sweep_modal_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_modal_prescribed_inputs,
         .outputs = mstmm_sweep_modal_prescribed_outputs,
-        .ir_hash = "a7e4a06fb2dfdeb461ef4c987352e6543ded077c7d82eb31a053ab3659abbbd1",
+        .ir_hash = "de5290959a1438760c1d0bbfded7cb39a4115ed9f97e79175fe40cc23f37d202",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -9549,7 +9549,7 @@ static const mstmm_kernel mstmm_sweep_modal_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_modal_modal_effort_inputs,
         .outputs = mstmm_sweep_modal_modal_effort_outputs,
-        .ir_hash = "60dfb86095e8b605861911ab834f63e0324beb6c7b2a8a177b0612dc9653ed04",
+        .ir_hash = "9f6b5fecd98714c085fdf44016d61b7b9da4157c6264246f9d132487aeff8425",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -9561,7 +9561,7 @@ static const mstmm_kernel mstmm_sweep_modal_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_modal_pushed_inputs,
         .outputs = mstmm_sweep_modal_pushed_outputs,
-        .ir_hash = "a71ac90b4bd1cbe9edbd385aad0fc340ef6d2f6ad1e378c9ef7a9ecfb528da77",
+        .ir_hash = "8cdd9b5d635f8a3ba2bc0d1bd8aa72fbb3519b9a3f478dbb64018400c69c0269",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -9573,7 +9573,7 @@ static const mstmm_kernel mstmm_sweep_modal_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_modal_answer_inputs,
         .outputs = mstmm_sweep_modal_answer_outputs,
-        .ir_hash = "eaf9285dc3124c21a1fd0d8fc3024d7b8bc4de7e96138bfb06efc72e6b427af3",
+        .ir_hash = "fb8143799772d005e805d856cf67511f7650357377cac5defe098d483ee80414",
         .n_guards = 1,
         .guards = mstmm_sweep_modal_answer_guards,
     },
@@ -9597,7 +9597,7 @@ static const mstmm_kernel mstmm_sweep_modal_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_modal_strained_inputs,
         .outputs = mstmm_sweep_modal_strained_outputs,
-        .ir_hash = "28da54245a2ef8ed75d781dc6d3a8f3ba01997cfc28b5cee35bd3b135642282d",
+        .ir_hash = "e1580bd01b79041a9ec958293c1cd70de2e6657a38a9eba4a18a227972a9c59b",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -9753,7 +9753,7 @@ static const mstmm_kernel mstmm_sweep_modal_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_modal_modal_effort_slope_inputs,
         .outputs = mstmm_sweep_modal_modal_effort_slope_outputs,
-        .ir_hash = "1ec13afb5579181c10dc2b2fee815b4483de6d07af94038b2af2f82794edc2b7",
+        .ir_hash = "3dbd36778f4d6433ac5e406377ea45247a7b6f77a48279b3085b6fc2572d3b0f",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -9763,7 +9763,7 @@ const mstmm_element mstmm_sweep_modal = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "modal",
-    .hash = "25842afe3f17d525472c6cbdd2c449d7c2773b02a327df58377a6224d77c3b64",
+    .hash = "2cb37473fdbbf3a886757c6770bfad8f30789073f7e7e3d634fcf711309bcb55",
     .nq = 0,
     .nu = 0,
     .np = 0,

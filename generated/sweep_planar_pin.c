@@ -70,7 +70,7 @@ int mstmm_sweep_planar_pin_shed(const real *restrict inverse, const real *restri
 int mstmm_sweep_planar_pin_multiplier_more(const real *restrict inverse, const real *restrict K,
     const real *restrict delta, real *restrict x);
 
-/* bias motion behind the pin hinge, in a plane
+/* bias motion outboard of the pin hinge, in a plane
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rt[2] rotation, inboard hinge axes to parent axes
@@ -174,7 +174,7 @@ static const mstmm_port mstmm_sweep_planar_pin_inertia_outputs[] = {
     {"S", 6, "", 0, 0},
 };
 
-/* load that the bias motion of the rigid body needs, in a plane
+/* load required by the bias motion of the rigid body, in a plane
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.25)
  * in  p[4] parameters: mass [kg], mcx [kg*m], mcy [kg*m], mcz [kg*m], Jxx [kg*m2], Jxy [kg*m2], Jxz [kg*m2], Jyy [kg*m2], Jyz [kg*m2], Jzz [kg*m2]; body axes, about its input end
  * in  motion[4] bias motion of the body: w, wd, rdd of its P, own axes
@@ -374,7 +374,7 @@ static const mstmm_port mstmm_sweep_planar_pin_point_outputs[] = {
     {"v_K", 3, "m/s", 0, 0},
 };
 
-/* turning of a body, in a plane
+/* rotation of a body, in a plane
  * in  A[2] rotation, body axes to inertial axes
  * in  motion[4] bias motion of the body: w, wd, rdd of its P, own axes
  * out w_K[3] (rad/s) angular velocity, inertial axes
@@ -650,14 +650,14 @@ static const mstmm_guard mstmm_sweep_planar_pin_factor_guards[] = {
     {1, "speed 1 of 1 moves no inertia: its acceleration is undetermined"},
 };
 
-/* load of a column carried across a hinge with 1 free speed, in a plane
+/* load of a right-hand side carried across a hinge with 1 free speed, in a plane
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[2] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  G[3] D^-1 H^T S
  * in  e[3] (N, N*m) force part of f = S a + e, at P
- * in  tau[1] (N, N*m) the column's efforts on the free coordinates
+ * in  tau[1] (N, N*m) efforts of the right-hand side on the free coordinates
  * out y[1] (N, N*m) tau - H^T e
  * out e_I[3] (N, N*m) contribution to the parent's e, added to what is there
  */
@@ -714,7 +714,7 @@ static const mstmm_port mstmm_sweep_planar_pin_push_outputs[] = {
     {"e_I", 3, "N, N*m", 1, 0},
 };
 
-/* accelerations that answer a column, across a hinge with 1 free speed, in a plane
+/* accelerations due to a right-hand side, across a hinge with 1 free speed, in a plane
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[2] rotation, body axes to parent axes
@@ -834,7 +834,7 @@ static const mstmm_port mstmm_sweep_planar_pin_couple_outputs[] = {
     {"L_ij", 1, "", 1, 0},
 };
 
-/* what a hinge with 1 speeds tells a row, in a plane
+/* contribution of a hinge with 1 speeds to a row, in a plane
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  y[1] tau - H^T e
@@ -865,7 +865,7 @@ static const mstmm_port mstmm_sweep_planar_pin_answered_outputs[] = {
     {"l", 1, "", 1, 0},
 };
 
-/* a multiplier felt by a hinge with 1 speeds, in a plane
+/* contribution of a multiplier to a hinge with 1 speeds, in a plane
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  y[1] of the row
@@ -894,11 +894,11 @@ static const mstmm_port mstmm_sweep_planar_pin_pull_outputs[] = {
     {"y_0", 1, "", 1, 0},
 };
 
-/* load of a column felt by a hinge on the ground with 1 free speed, in a plane
+/* load of a right-hand side along a hinge on the ground with 1 free speed, in a plane
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  e[3] (N, N*m) force part of f = S a + e, at P
- * in  tau[1] (N, N*m) the column's efforts on the free coordinates
+ * in  tau[1] (N, N*m) efforts of the right-hand side on the free coordinates
  * out y[1] (N, N*m) tau - H^T e
  */
 int mstmm_sweep_planar_pin_push_on_ground(const real *restrict e, const real *restrict tau,
@@ -924,14 +924,14 @@ static const mstmm_port mstmm_sweep_planar_pin_push_on_ground_outputs[] = {
     {"y", 1, "N, N*m", 0, 0},
 };
 
-/* the two sides of a hinge that closes a loop, in a plane
+/* the two sides of a cut hinge, in a plane
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  A_C[2] rotation, axes of C to inertial axes
  * in  x_C[3] (m) origin of C, inertial axes
  * in  A_B[2] rotation, axes of B to inertial axes
  * in  x_B[3] (m) P of B, inertial axes
- * in  r_e[2] (m) the end of B that the hinge holds, from P, axes of B
+ * in  r_e[2] (m) end of B at the hinge, from P, axes of B
  * in  Rc[2] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * out R_C[2] rotation, axes of C to axes of B
@@ -1005,11 +1005,11 @@ static const mstmm_port mstmm_sweep_planar_pin_meet_outputs[] = {
     {"d", 2, "m", 0, 0},
 };
 
-/* slip of a hinge that closes a loop, in a plane
+/* velocity error of a cut hinge, in a plane
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  R_C[2] rotation, axes of C to axes of B
- * in  r_e[2] (m) the end of B that the hinge holds, from P, axes of B
+ * in  r_e[2] (m) end of B at the hinge, from P, axes of B
  * in  d[2] (m) that end from the origin of C, axes of C
  * in  v_C[2] (m/s) velocity of C, own axes
  * in  w_C[1] (rad/s) angular velocity of C, own axes
@@ -1064,16 +1064,16 @@ static const mstmm_port mstmm_sweep_planar_pin_slip_outputs[] = {
     {"slip", 3, "", 0, 0},
 };
 
-/* drift of a hinge that closes a loop, in a plane
+/* drift of a cut hinge, in a plane
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  R_C[2] rotation, axes of C to axes of B
- * in  r_e[2] (m) the end of B that the hinge holds, from P, axes of B
+ * in  r_e[2] (m) end of B at the hinge, from P, axes of B
  * in  d[2] (m) that end from the origin of C, axes of C
  * in  slip[3] rate of d and relative angular velocity, axes of C
  * in  motion_C[4] bias motion of C: w, wd, rdd, own axes
  * in  motion_B[4] bias motion of B: w, wd, rdd, own axes
- * out drift[3] rate of the slip in the bias motion, axes of C
+ * out drift[3] rate of the velocity error in the bias motion, axes of C
  */
 int mstmm_sweep_planar_pin_drift(const real *restrict R_C, const real *restrict r_e,
     const real *restrict d, const real *restrict slip, const real *restrict motion_C,
@@ -1137,12 +1137,12 @@ static const mstmm_port mstmm_sweep_planar_pin_drift_outputs[] = {
     {"drift", 3, "", 0, 0},
 };
 
-/* row of a direction of a hinge that closes a loop, in a plane
+/* row of a direction of a cut hinge, in a plane
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  w[3] the direction: a row of W
  * in  R_C[2] rotation, axes of C to axes of B
- * in  r_e[2] (m) the end of B that the hinge holds, from P, axes of B
+ * in  r_e[2] (m) end of B at the hinge, from P, axes of B
  * in  Rc[2] rotation, body axes to parent axes
  * in  r_A[2] (m) the end of B from P of A, axes of A
  * out J_A[3] row by the acceleration of A, at its P
@@ -1202,12 +1202,12 @@ static const mstmm_port mstmm_sweep_planar_pin_row_outputs[] = {
     {"J_B", 3, "", 0, 0},
 };
 
-/* known parts of the rows of a hinge that closes a loop, in a plane
+/* known parts of the rows of a cut hinge, in a plane
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
- * in  W[18] rows: H^+, then what the hinge holds
+ * in  W[18] rows: H^+, then the constrained directions
  * in  relative[3] motion of the end of B relative to C
- * out l[6] rows of what is known
+ * out l[6] known parts of the rows
  */
 int mstmm_sweep_planar_pin_known(const real *restrict W, const real *restrict relative,
     real *restrict l)
@@ -1266,12 +1266,12 @@ static const mstmm_port mstmm_sweep_planar_pin_known_outputs[] = {
     {"l", 6, "", 0, 0},
 };
 
-/* acceleration along a direction of a hinge that closes a loop, in a plane
+/* acceleration along a direction of a cut hinge, in a plane
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  J_A[3] row by the acceleration of A, at its P
  * in  J_B[3] row by the acceleration of B, at its P
- * in  l[1] row of what is known
+ * in  l[1] known part of the row
  * in  delta_A[3] deviation of the acceleration of A
  * in  delta_B[3] deviation of the acceleration of B
  * out c[1] acceleration along the direction
@@ -1317,7 +1317,7 @@ static const mstmm_port mstmm_sweep_planar_pin_told_outputs[] = {
 /* load of an effort, in a plane
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
- * in  J[3] load of an effort of one
+ * in  J[3] load of a unit effort
  * in  tau[1] (N, N*m) effort
  * out e[3] (N, N*m) force part of f = S a + e, added to what is there
  */
@@ -1350,12 +1350,12 @@ static const mstmm_port mstmm_sweep_planar_pin_act_outputs[] = {
     {"e", 3, "N, N*m", 1, 0},
 };
 
-/* a row closed where its ends meet, in a plane
+/* a row eliminated where its ends meet, in a plane
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
- * in  inverse[1] 1 / L_rr, zero where nothing moves the row
- * in  K[3] column of the row, at P of the body that it is seen from
- * in  l[1] what of the row does not go by multipliers or motion
+ * in  inverse[1] 1 / L_rr, zero where no motion affects the row
+ * in  K[3] column of the row, at P of its current body
+ * in  l[1] part of the row independent of multipliers and motion
  * out S[6] S of the body, added to what is there
  * out e[3] e of the body, added to what is there
  */
@@ -1403,12 +1403,12 @@ static const mstmm_port mstmm_sweep_planar_pin_close_outputs[] = {
     {"e", 3, "", 1, 0},
 };
 
-/* column of a row that stays while another is closed, in a plane
+/* column of a remaining row while another is eliminated, in a plane
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
- * in  inverse[1] 1 / L_rr, zero where nothing moves the row
- * in  K[3] column of the row, at P of the body that it is seen from
- * in  L_p[1] entry of L of the row that closes and another
+ * in  inverse[1] 1 / L_rr, zero where no motion affects the row
+ * in  K[3] column of the row, at P of its current body
+ * in  L_p[1] entry of L of the eliminated row and another
  * out K_p[3] column of row p, added to what is there
  */
 int mstmm_sweep_planar_pin_shed(const real *restrict inverse, const real *restrict K,
@@ -1445,11 +1445,11 @@ static const mstmm_port mstmm_sweep_planar_pin_shed_outputs[] = {
     {"K_p", 3, "", 1, 0},
 };
 
-/* share of a motion in a multiplier, in a plane
+/* contribution of a motion to a multiplier, in a plane
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
- * in  inverse[1] 1 / L_rr, zero where nothing moves the row
- * in  K[3] column of the row, at P of the body that it is seen from
+ * in  inverse[1] 1 / L_rr, zero where no motion affects the row
+ * in  K[3] column of the row, at P of its current body
  * in  delta[3] deviation of the acceleration of the body
  * out x[1] multiplier of row r, added to what is there
  */
@@ -1493,7 +1493,7 @@ static const mstmm_kernel mstmm_sweep_planar_pin_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_planar_pin_forward_inputs,
         .outputs = mstmm_sweep_planar_pin_forward_outputs,
-        .ir_hash = "69103edd6c0d581c8d96f02c068de81b9e4c1d4b4e0d0e869117a41f360dbfa7",
+        .ir_hash = "53df184f3946e39f5c9cd9ce2ad730a30250d9144f34b0e08f2320d0a91ddc9b",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1517,7 +1517,7 @@ static const mstmm_kernel mstmm_sweep_planar_pin_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_planar_pin_bias_load_inputs,
         .outputs = mstmm_sweep_planar_pin_bias_load_outputs,
-        .ir_hash = "785dc2ef8abb65383f196b8949cde3bbbae72ac47a8ad39226f7c778a326c799",
+        .ir_hash = "8fb890c1fd924abc89d39ced154b4f019c0542a5da1498777752f4f27747692c",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1565,7 +1565,7 @@ static const mstmm_kernel mstmm_sweep_planar_pin_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_planar_pin_turning_inputs,
         .outputs = mstmm_sweep_planar_pin_turning_outputs,
-        .ir_hash = "08afa7cc22aa31864a24562c3437fc705fd629a88974624bc9e74261fe597ce0",
+        .ir_hash = "4041451e1ade9694a8d7fd5ef2a2cf245fecdbb6cb3a0d5c8039528cc884f399",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1613,7 +1613,7 @@ static const mstmm_kernel mstmm_sweep_planar_pin_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_planar_pin_push_inputs,
         .outputs = mstmm_sweep_planar_pin_push_outputs,
-        .ir_hash = "1ce826d919d23a4430fbdf8bb7d1a545215fb8be26d228f0e299878bdf1f3173",
+        .ir_hash = "ea148c6bc28fe1fce2e1a278c3119ef00144a62156facdc2eeec93b81e56d068",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1625,7 +1625,7 @@ static const mstmm_kernel mstmm_sweep_planar_pin_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_planar_pin_answer_inputs,
         .outputs = mstmm_sweep_planar_pin_answer_outputs,
-        .ir_hash = "e773bedcf6f08b485138df1ab72e081733969ce0a4af4417c2c35fbf5c65047c",
+        .ir_hash = "04b89ac4278a12f7a5eaafd6dc01a88a2da3c793b867ec0bc3a05b7591a24bf5",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1661,7 +1661,7 @@ static const mstmm_kernel mstmm_sweep_planar_pin_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_planar_pin_answered_inputs,
         .outputs = mstmm_sweep_planar_pin_answered_outputs,
-        .ir_hash = "b929476d9b4c5a696a446b8f3e11356b339e3ab738f6c2ace2e02cee068a63e4",
+        .ir_hash = "3c084658becd549560d1ff478a120d8b90a28c418fa1ae6a4081e0d288187b60",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1673,7 +1673,7 @@ static const mstmm_kernel mstmm_sweep_planar_pin_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_planar_pin_pull_inputs,
         .outputs = mstmm_sweep_planar_pin_pull_outputs,
-        .ir_hash = "e5e158778d93843bd79f19c5fc06d723fb3084d0bc3494317439a24d01d189bb",
+        .ir_hash = "83fea64b3bacd8e16951f8817042f046960daa292f71fd3763f53f72f2e03a6b",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1685,7 +1685,7 @@ static const mstmm_kernel mstmm_sweep_planar_pin_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_planar_pin_push_on_ground_inputs,
         .outputs = mstmm_sweep_planar_pin_push_on_ground_outputs,
-        .ir_hash = "772e6e01239aee97f17a9cba2f28aa3ac726de57f1049deae400430011b52295",
+        .ir_hash = "85fa6b3964d125e6c83e7346d9ff3248b6595e9137c48f1edbc49341c8eb7e02",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1697,7 +1697,7 @@ static const mstmm_kernel mstmm_sweep_planar_pin_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_planar_pin_meet_inputs,
         .outputs = mstmm_sweep_planar_pin_meet_outputs,
-        .ir_hash = "4074c92772748a6efd252c017bf3d0a02ecf026e216e222d4b091348c6f73dfb",
+        .ir_hash = "c546a338622ed23aebf5b021a5fea76f3a04a83d378b272d2138b9ff3f3cf54d",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1709,7 +1709,7 @@ static const mstmm_kernel mstmm_sweep_planar_pin_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_planar_pin_slip_inputs,
         .outputs = mstmm_sweep_planar_pin_slip_outputs,
-        .ir_hash = "bc747cb4a3bc1331c267fab68302852ae1bf9cebf13e9de42ea6d4d0af79f45b",
+        .ir_hash = "d6c25802bf0c11a5b7a8c2fdbf7134d56934d7327bc4d8f711f9686bcf2ce506",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1721,7 +1721,7 @@ static const mstmm_kernel mstmm_sweep_planar_pin_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_planar_pin_drift_inputs,
         .outputs = mstmm_sweep_planar_pin_drift_outputs,
-        .ir_hash = "d432656baf93b4825f2b5fc7ef99c097b6495718053d56fdfc1ef8a491f9f47c",
+        .ir_hash = "af7c366d6c26a2851428e5fa97e020d82935a78ca6772c38ea1d23f4f75ef8ce",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1733,7 +1733,7 @@ static const mstmm_kernel mstmm_sweep_planar_pin_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_planar_pin_row_inputs,
         .outputs = mstmm_sweep_planar_pin_row_outputs,
-        .ir_hash = "62fc4f777db8d5ea3ca8dda5dcdee56b46ac7975edc67e6a3e93198a62f862fa",
+        .ir_hash = "0f2fb3eaf7412978af4a758c5ad1e16e0b09e7e49010c086aa13981b38c35845",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1745,7 +1745,7 @@ static const mstmm_kernel mstmm_sweep_planar_pin_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_planar_pin_known_inputs,
         .outputs = mstmm_sweep_planar_pin_known_outputs,
-        .ir_hash = "f18a6dc12a699c93e731ee0d3a16d896e86075996a44a106466a05dc4b625363",
+        .ir_hash = "d1ec34caeaa99d82571e5c5f76cd30b24e390eb0797210254d40ff298264c490",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1757,7 +1757,7 @@ static const mstmm_kernel mstmm_sweep_planar_pin_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_planar_pin_told_inputs,
         .outputs = mstmm_sweep_planar_pin_told_outputs,
-        .ir_hash = "a14f18d89b0eb81f00658166acd56913a748151510fbc28e46af7a9322f3fe4a",
+        .ir_hash = "ea267dc592f043c402aabea4c12d14114726cb353ebe84d9a2eef9a5b7272b0d",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1769,7 +1769,7 @@ static const mstmm_kernel mstmm_sweep_planar_pin_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_planar_pin_act_inputs,
         .outputs = mstmm_sweep_planar_pin_act_outputs,
-        .ir_hash = "5c0f474de4d64a8a95524deb88480e4fdfb7d69128dd0c3331c472434adf81c8",
+        .ir_hash = "4b743bdcc92302efbd7700ebb8c1995e15bcb06fde8e342ef7b07a57a30ebe9a",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1781,7 +1781,7 @@ static const mstmm_kernel mstmm_sweep_planar_pin_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_planar_pin_close_inputs,
         .outputs = mstmm_sweep_planar_pin_close_outputs,
-        .ir_hash = "48dcb517ec42042dca5fd735358d0b0b132e5244cbb3b5a3a7a99f67129f6196",
+        .ir_hash = "9874bd5f5e0244011bab0588e4eb8dbc0645f3cc11c720d1b1017c3147bf7fc0",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1793,7 +1793,7 @@ static const mstmm_kernel mstmm_sweep_planar_pin_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_planar_pin_shed_inputs,
         .outputs = mstmm_sweep_planar_pin_shed_outputs,
-        .ir_hash = "68015bca907c0321664c0c3390ccbafea899c3f8c39596b1613ebdec5aab1b51",
+        .ir_hash = "b76a4c541e1e6339ccfc5e5dd020d1282a53fdfaab8bb9c950709fa6e83f83b4",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1805,7 +1805,7 @@ static const mstmm_kernel mstmm_sweep_planar_pin_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_planar_pin_multiplier_more_inputs,
         .outputs = mstmm_sweep_planar_pin_multiplier_more_outputs,
-        .ir_hash = "b246604a8d85cdc6b5c1c6a3d1aee28dedb955693001fa63b8a3eeb75156962b",
+        .ir_hash = "75683f6a1ab29331a87624f828335c3e6ae84d626dee1b44db5ec50f43375935",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1815,7 +1815,7 @@ const mstmm_element mstmm_sweep_planar_pin = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "planar_pin",
-    .hash = "2a7cad38763a7936d75589d29944fe07be38434002683baf4e6c2f9f78b37319",
+    .hash = "38f4f2f33f18a15c2a34a32cc4e21cc9458601a5409d130c32e5b4f37e27606f",
     .nq = 0,
     .nu = 0,
     .np = 0,

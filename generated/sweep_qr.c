@@ -17,7 +17,7 @@ int mstmm_sweep_qr_merge(const real *restrict Rc, const real *restrict r, const 
 int mstmm_sweep_qr_restored(const real *restrict U, const real *restrict d, const real *restrict e,
     real *restrict S, real *restrict e_S);
 
-/* rows of a body alone
+/* rows of a single body
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * source: Gauss, J. reine angew. Math. 4 (1829) 232-235 (least constraint)
@@ -183,14 +183,14 @@ static const mstmm_port mstmm_sweep_qr_factor_outputs[] = {
     {"U", 21, "", 0, 0},
 };
 
-/* loads of a rigid body alone by its rows
+/* loads of a single rigid body by its rows
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * source: Gauss, J. reine angew. Math. 4 (1829) 232-235 (least constraint)
  * source: Golub, Van Loan, Matrix Computations, 4th ed., 5.1-5.3 (rotations, least squares)
  * in  U[21] upper triangle, row by row: S = U^T U
  * in  motion[9] bias motion of the body: w, wd, rdd of its P, own axes
- * out d[6] load that rows take: f = U^T (U a + d) + e
+ * out d[6] load in the rows: f = U^T (U a + d) + e
  * out e[6] (N, N*m) force part of f = S a + e, at P
  */
 int mstmm_sweep_qr_bias(const real *restrict U, const real *restrict motion, real *restrict d,
@@ -329,13 +329,13 @@ static const mstmm_port mstmm_sweep_qr_bias_outputs[] = {
  * source: Golub, Van Loan, Matrix Computations, 4th ed., 5.1-5.3 (rotations, least squares)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
- * in  V[21] upper triangle of what is behind the hinge
- * in  d_V[6] load that its rows take
- * in  e_Q[6] (N, N*m) load that they do not take
+ * in  V[21] upper triangle outboard of the hinge
+ * in  d_V[6] load in its rows
+ * in  e_Q[6] (N, N*m) load outside the rows
  * in  U_P[21] upper triangle of the parent so far
- * in  d_P[6] load that its rows take
+ * in  d_P[6] load in its rows
  * out U[21] upper triangle, row by row: S = U^T U
- * out d[6] load that rows take: f = U^T (U a + d) + e
+ * out d[6] load in the rows: f = U^T (U a + d) + e
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
 int mstmm_sweep_qr_merge(const real *restrict Rc, const real *restrict r, const real *restrict V,
@@ -1354,7 +1354,7 @@ static const mstmm_port mstmm_sweep_qr_merge_outputs[] = {
  * source: Gauss, J. reine angew. Math. 4 (1829) 232-235 (least constraint)
  * source: Golub, Van Loan, Matrix Computations, 4th ed., 5.1-5.3 (rotations, least squares)
  * in  U[21] upper triangle, row by row: S = U^T U
- * in  d[6] load that rows take: f = U^T (U a + d) + e
+ * in  d[6] load in the rows: f = U^T (U a + d) + e
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * out S[21] f = S a + e of everything outboard, at P
  * out e_S[6] (N, N*m) force part of f = S a + e
@@ -1551,7 +1551,7 @@ static const mstmm_kernel mstmm_sweep_qr_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_qr_factor_inputs,
         .outputs = mstmm_sweep_qr_factor_outputs,
-        .ir_hash = "ed99914482d6ce5dee2ed3ba50b92af092e78a07c34ce5cb8aa861d03d5a2f39",
+        .ir_hash = "ca7b8c446d346d8544d16023071101b893be9033a9534cc11ce55df5d29708b2",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1563,7 +1563,7 @@ static const mstmm_kernel mstmm_sweep_qr_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_qr_bias_inputs,
         .outputs = mstmm_sweep_qr_bias_outputs,
-        .ir_hash = "15734bffb181a3980445833fe03151aa7cd4362be9c4c7e90222d5aba525be85",
+        .ir_hash = "6b650dd2e92884a543afc109dfb26e7f8196746e418ca47355bf806d90255977",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1575,7 +1575,7 @@ static const mstmm_kernel mstmm_sweep_qr_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_qr_merge_inputs,
         .outputs = mstmm_sweep_qr_merge_outputs,
-        .ir_hash = "3434a6ddc4224afaac61184e187dd99d8b1513c15564e3c887691d6946521f25",
+        .ir_hash = "c352c71817255e29b1ed7f6fe25c70ca010eeb11fa4bfadd2842d9b4f2f29fee",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1587,7 +1587,7 @@ static const mstmm_kernel mstmm_sweep_qr_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_qr_restored_inputs,
         .outputs = mstmm_sweep_qr_restored_outputs,
-        .ir_hash = "1344961cf96f85d75dae7550aaa1c9abd4c30cd0344a064c132442d69ad116e1",
+        .ir_hash = "b0a9cbfe2606c93f34df44ce3dd9a239b0615e3e13835ed5ed5e8bf912e9d248",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1597,7 +1597,7 @@ const mstmm_element mstmm_sweep_qr = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "qr",
-    .hash = "b6809e32d73a303bd10880d6edd98256ec7837201f8a0589e90e3cb25b16149c",
+    .hash = "1c773220d0406270cdedbbd72a1bd478f0374040396511058da976956688d02b",
     .nq = 0,
     .nu = 0,
     .np = 0,

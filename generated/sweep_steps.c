@@ -343,7 +343,7 @@ int64_t mstmm_section_numbers(int n) { return (int64_t)18 * n + 54; }
 int64_t mstmm_bend_numbers(int n) { return (int64_t)89 * n + 4 * (int64_t)n * n; }
 int64_t mstmm_port_numbers(int n) { return (int64_t)30 * n + 1 * (int64_t)n * n; }
 
-/* Accelerations that are given: all, or none so far. */
+/* Given accelerations: all, or zero. */
 static int mstmm_at_prescribed(mstmm_state *state, int index)
 {
     const mstmm_body *body = &state->model->bodies[index];
@@ -359,7 +359,7 @@ static int mstmm_at_prescribed(mstmm_state *state, int index)
     return 0;
 }
 
-/* Driven coordinates, speeds and accelerations filled in. */
+/* Prescribed coordinates, speeds and accelerations set. */
 static int mstmm_at_drives(mstmm_state *state, int index)
 {
     const mstmm_drive *drive = &state->model->drives[index];
@@ -550,7 +550,7 @@ int mstmm_at_forward(mstmm_state *state, int index, const real *parent_motion)
     return 0;
 }
 
-/* Rows of a body alone, and in them its load at the bias motion. */
+/* Rows of a single body, with its load at the bias motion. */
 static int mstmm_at_qr_own(mstmm_state *state, int index)
 {
     real U[21];
@@ -585,7 +585,7 @@ static int mstmm_at_efforts_power(mstmm_state *state, int index)
     return 0;
 }
 
-/* Efforts of the caller where the sweep reads them. */
+/* Efforts of the caller, copied to the slots of the sweep. */
 static int mstmm_at_efforts(mstmm_state *state, int index)
 {
     const mstmm_body *body = &state->model->bodies[index];
@@ -634,7 +634,7 @@ static int mstmm_at_laws(mstmm_state *state, int index)
     return 0;
 }
 
-/* Efforts without what rotors take of the accelerations in the answer. */
+/* Efforts less those of the rotors at the accelerations of the solution. */
 static int mstmm_at_restated(mstmm_state *state, int index)
 {
     real lack[1];
@@ -665,7 +665,7 @@ static int mstmm_at_restated(mstmm_state *state, int index)
     return 0;
 }
 
-/* Efforts without what rotors take of the accelerations in the answer. */
+/* Efforts less those of the rotors at the accelerations of the solution. */
 static int mstmm_at_restated_of_tree(mstmm_state *state, int index)
 {
     real lack[1];
@@ -733,7 +733,7 @@ static int mstmm_at_poses(mstmm_state *state, int index)
     return 0;
 }
 
-/* Viscous drag of flexible bodies: momentum under the density of the drag. */
+/* Viscous drag of flexible bodies: momentum with the drag as density. */
 static int mstmm_at_drag(mstmm_state *state, int index)
 {
     real S[21];
@@ -1132,7 +1132,7 @@ int mstmm_at_recover(mstmm_state *state, int index, const real *parent_delta)
     return 0;
 }
 
-/* Rows of what closes a loop, and the load of a hinge's laws. */
+/* Rows of the element that closes a loop, and the load of the laws of a hinge. */
 static int mstmm_at_closures(mstmm_state *state, int index)
 {
     real drift[6];
@@ -1302,7 +1302,7 @@ static int mstmm_at_closures(mstmm_state *state, int index)
     return 0;
 }
 
-/* A row closed on the body where its ends meet. */
+/* A row eliminated on the body where its ends meet. */
 static int mstmm_at_row_closed(mstmm_state *state, int index)
 {
     real *loops = state->workspace + state->model->loops;
@@ -1623,7 +1623,7 @@ static int mstmm_at_answered(mstmm_state *state, int index)
     return 0;
 }
 
-/* Accelerations and load of a hinge that closes a loop. */
+/* Accelerations and load of a cut hinge. */
 static int mstmm_at_closures_answered(mstmm_state *state, int index)
 {
     real along[1];
@@ -1675,7 +1675,7 @@ static int mstmm_at_closures_answered(mstmm_state *state, int index)
     return 0;
 }
 
-/* Power that drives and holds feed in. */
+/* Power supplied by drives and locked hinges. */
 static int mstmm_at_drive_power(mstmm_state *state, int index)
 {
     real f[6];
@@ -1706,7 +1706,7 @@ static int mstmm_at_drive_power(mstmm_state *state, int index)
     return 0;
 }
 
-/* Multipliers of couplings, and the power that those feed in whose values go by time. */
+/* Multipliers of couplings, and the power supplied by time-dependent couplings. */
 static int mstmm_at_couplings_answered(mstmm_state *state, int index)
 {
     real P[1];
@@ -1750,7 +1750,7 @@ static int mstmm_at_forward_in_plane(mstmm_state *state, int index)
     return 0;
 }
 
-/* Efforts of the caller where the sweep reads them. */
+/* Efforts of the caller, copied to the slots of the sweep. */
 static int mstmm_at_efforts_in_plane(mstmm_state *state, int index)
 {
     const mstmm_flat_body *body = &state->model->flat[index];
@@ -1813,7 +1813,7 @@ static int mstmm_at_poses_in_plane(mstmm_state *state, int index)
     return 0;
 }
 
-/* Rows of what closes a loop, and the load of a hinge's laws. */
+/* Rows of the element that closes a loop, and the load of the laws of a hinge. */
 static int mstmm_at_closures_in_plane(mstmm_state *state, int index)
 {
     real R_C[2];
@@ -1941,7 +1941,7 @@ static int mstmm_at_forces_in_plane(mstmm_state *state, int index)
     return 0;
 }
 
-/* A row closed on the body where its ends meet. */
+/* A row eliminated on the body where its ends meet. */
 static int mstmm_at_row_closed_in_plane(mstmm_state *state, int index)
 {
     real *loops = state->workspace + state->model->loops;
@@ -2088,7 +2088,7 @@ static int mstmm_at_answered_in_plane(mstmm_state *state, int index)
     return 0;
 }
 
-/* Accelerations and load of a hinge that closes a loop. */
+/* Accelerations and load of a cut hinge. */
 static int mstmm_at_closures_answered_in_plane(mstmm_state *state, int index)
 {
     real along[1];
@@ -2107,7 +2107,7 @@ static int mstmm_at_closures_answered_in_plane(mstmm_state *state, int index)
     return 0;
 }
 
-/* Rows of couplings at the accelerations that are given, and the efforts of their multipliers. */
+/* Rows of couplings at the given accelerations, and the efforts of their multipliers. */
 static int mstmm_at_couplings_loaded(mstmm_state *state, int index)
 {
     const mstmm_body *body = &state->model->bodies[index];
@@ -2133,7 +2133,7 @@ static int mstmm_at_couplings_loaded(mstmm_state *state, int index)
     return 0;
 }
 
-/* Rows of a hinge that closes a loop, and all the load that it puts on its bodies. */
+/* Rows of a cut hinge, and its complete load on its bodies. */
 static int mstmm_at_closures_loaded(mstmm_state *state, int index)
 {
     real drift[6];
@@ -2243,7 +2243,7 @@ static int mstmm_at_closures_loaded(mstmm_state *state, int index)
     return 0;
 }
 
-/* Efforts beyond the laws' own, and the load on the parent. */
+/* Efforts required beyond those of the laws, and the load on the parent. */
 static int mstmm_at_required(mstmm_state *state, int index)
 {
     real tau[6];
@@ -2290,7 +2290,7 @@ static int mstmm_at_required(mstmm_state *state, int index)
     return 0;
 }
 
-/* No load and no effort: the rows alone are to be met. */
+/* Loads and efforts set to zero: only the rows are to be satisfied. */
 static int mstmm_at_unloaded(mstmm_state *state, int index)
 {
     const mstmm_body *body = &state->model->bodies[index];
@@ -2308,7 +2308,7 @@ static int mstmm_at_unloaded(mstmm_state *state, int index)
     return 0;
 }
 
-/* Mass matrices carried to the root; what each elimination leaves is kept. */
+/* Mass matrices carried to the root; factors of eliminations stored. */
 static int mstmm_at_factorise(mstmm_state *state, int index)
 {
     real hinge_J_free[6];
@@ -2356,7 +2356,7 @@ static int mstmm_at_factorise(mstmm_state *state, int index)
     return 0;
 }
 
-/* One column as efforts, and no load yet. */
+/* Efforts of one right-hand side; loads set to zero. */
 static int mstmm_at_column(mstmm_state *state, int index)
 {
     const mstmm_body *body = &state->model->bodies[index];
@@ -2376,7 +2376,7 @@ static int mstmm_at_column(mstmm_state *state, int index)
     return 0;
 }
 
-/* The column's load carried across the hinge to the parent. */
+/* Load of the right-hand side carried across the hinge to the parent. */
 static int mstmm_at_column_carried(mstmm_state *state, int index)
 {
     real e_c[6];
@@ -2432,7 +2432,7 @@ static int mstmm_at_column_carried(mstmm_state *state, int index)
     return 0;
 }
 
-/* Accelerations that answer the column. */
+/* Accelerations due to the right-hand side. */
 static int mstmm_at_column_answered(mstmm_state *state, int index)
 {
     real delta[6];
@@ -2481,7 +2481,7 @@ static int mstmm_at_column_answered(mstmm_state *state, int index)
     return 0;
 }
 
-/* Derivatives: accelerations that are given: all, or none so far. */
+/* Derivatives: given accelerations: all, or zero. */
 static int mstmm_at_prescribed_slope(mstmm_state *state, int index)
 {
     const mstmm_body *body = &state->model->bodies[index];
@@ -2497,7 +2497,7 @@ static int mstmm_at_prescribed_slope(mstmm_state *state, int index)
     return 0;
 }
 
-/* Derivatives: driven coordinates, speeds and accelerations filled in. */
+/* Derivatives: prescribed coordinates, speeds and accelerations set. */
 static int mstmm_at_drives_slope(mstmm_state *state, int index)
 {
     const mstmm_drive *drive = &state->model->drives[index];
@@ -2667,7 +2667,7 @@ static int mstmm_at_forward_slope(mstmm_state *state, int index)
     return 0;
 }
 
-/* Derivatives: efforts of the caller where the sweep reads them. */
+/* Derivatives: efforts of the caller, copied to the slots of the sweep. */
 static int mstmm_at_efforts_slope(mstmm_state *state, int index)
 {
     const mstmm_body *body = &state->model->bodies[index];
@@ -2721,7 +2721,7 @@ static int mstmm_at_laws_slope(mstmm_state *state, int index)
     return 0;
 }
 
-/* Derivatives: rows of couplings at the accelerations that are given, and the efforts of their multipliers. */
+/* Derivatives: rows of couplings at the given accelerations, and the efforts of their multipliers. */
 static int mstmm_at_couplings_loaded_slope(mstmm_state *state, int index)
 {
     const mstmm_body *body = &state->model->bodies[index];
@@ -2778,7 +2778,7 @@ static int mstmm_at_poses_slope(mstmm_state *state, int index)
     return 0;
 }
 
-/* Derivatives: viscous drag of flexible bodies: momentum under the density of the drag. */
+/* Derivatives: viscous drag of flexible bodies: momentum with the drag as density. */
 static int mstmm_at_drag_slope(mstmm_state *state, int index)
 {
     real d_h[6];
@@ -2967,7 +2967,7 @@ static int mstmm_at_forces_slope(mstmm_state *state, int index)
     return 0;
 }
 
-/* Derivatives: rows of a hinge that closes a loop, and all the load that it puts on its bodies. */
+/* Derivatives: rows of a cut hinge, and its complete load on its bodies. */
 static int mstmm_at_closures_loaded_slope(mstmm_state *state, int index)
 {
     real drift[6];
@@ -3118,7 +3118,7 @@ static int mstmm_at_closures_loaded_slope(mstmm_state *state, int index)
     return 0;
 }
 
-/* Derivatives: efforts beyond the laws' own, and the load on the parent. */
+/* Derivatives: efforts required beyond those of the laws, and the load on the parent. */
 static int mstmm_at_required_slope(mstmm_state *state, int index)
 {
     real tau[6];
@@ -3173,7 +3173,7 @@ static int mstmm_at_required_slope(mstmm_state *state, int index)
     return 0;
 }
 
-/* Loads begun from none. */
+/* Loads set to zero. */
 static int mstmm_at_no_loads(mstmm_state *state, int index)
 {
     const mstmm_body *body = &state->model->bodies[index];
@@ -3379,7 +3379,7 @@ static int mstmm_at_laws_across(mstmm_state *state, int index)
     return 0;
 }
 
-/* How the coordinates of a hinge follow its speeds within a step. */
+/* Derivatives of the coordinates of a hinge by its speeds within a step. */
 static int mstmm_at_lag(mstmm_state *state, int index)
 {
     const mstmm_body *body = &state->model->bodies[index];
@@ -3415,7 +3415,7 @@ static int mstmm_at_lag(mstmm_state *state, int index)
     return 0;
 }
 
-/* A body's own load by its motion and its modes. */
+/* Derivatives of a body's own load by its motion and its modes. */
 static int mstmm_at_tangent_own(mstmm_state *state, int index)
 {
     const mstmm_model *model = state->model;
@@ -3521,7 +3521,7 @@ static int mstmm_at_tangent_own(mstmm_state *state, int index)
     return 0;
 }
 
-/* Slopes of a law along the unknowns of its hinge. */
+/* Derivatives of a law along the unknowns of its hinge. */
 static int mstmm_at_law_slopes(mstmm_state *state, int index)
 {
     real d_tau[6];
@@ -3557,7 +3557,7 @@ static int mstmm_at_law_slopes(mstmm_state *state, int index)
     return 0;
 }
 
-/* Change of a load in the axes of space as its body turns. */
+/* Change of a load in inertial axes by the rotation of its body. */
 static int mstmm_at_loads_by_place(mstmm_state *state, int index)
 {
     real A_F[9];
@@ -3598,7 +3598,7 @@ static int mstmm_at_loads_by_place(mstmm_state *state, int index)
     return 0;
 }
 
-/* Change of an element to the ground as its body moves. */
+/* Change of the load of an element on the ground by its motion. */
 static int mstmm_at_forces_by_place(mstmm_state *state, int index)
 {
     real x_F[3];
@@ -4236,7 +4236,7 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
     return 0;
 }
 
-/* What a body brings to the elimination. */
+/* Contribution of a body to the elimination. */
 static int mstmm_at_tangent_brought(mstmm_state *state, int index)
 {
     real carrier[9];
@@ -4560,7 +4560,7 @@ static int mstmm_at_tangent_carried(mstmm_state *state, int index)
     return 0;
 }
 
-/* Unknowns that answer a right-hand side. */
+/* Solution for a right-hand side. */
 static int mstmm_at_tangent_answered(mstmm_state *state, int index)
 {
     real x[6];
@@ -4681,7 +4681,7 @@ static int mstmm_at_tangent_answered(mstmm_state *state, int index)
     return 0;
 }
 
-/* A right-hand side, and own loads by what is known of modes. */
+/* A right-hand side, with own loads due to known modal increments. */
 static int mstmm_at_known_column(mstmm_state *state, int index)
 {
     const mstmm_body *body = &state->model->bodies[index];
@@ -4710,7 +4710,7 @@ static int mstmm_at_known_column(mstmm_state *state, int index)
     return 0;
 }
 
-/* Change of a law's efforts by what is known of its hinge. */
+/* Change of the efforts of a law due to known increments of its hinge. */
 static int mstmm_at_known_laws(mstmm_state *state, int index)
 {
     real d_tau[6];
@@ -4738,7 +4738,7 @@ static int mstmm_at_known_laws(mstmm_state *state, int index)
     return 0;
 }
 
-/* The same loads carried to the parent, with what is known. */
+/* The same loads carried to the parent, with known increments. */
 static int mstmm_at_known_carried(mstmm_state *state, int index)
 {
     real carrier[9];
@@ -5003,7 +5003,7 @@ static int mstmm_at_known_carried(mstmm_state *state, int index)
     return 0;
 }
 
-/* Unknowns that answer a right-hand side, beside what is known. */
+/* Solution for a right-hand side with known increments. */
 static int mstmm_at_known_answered(mstmm_state *state, int index)
 {
     real x[6];
@@ -5174,7 +5174,7 @@ static int mstmm_at_laws_own(mstmm_state *state, int index)
     return 0;
 }
 
-/* Rates of the coordinates by each of the speeds. */
+/* Derivatives of the coordinate rates by each speed. */
 static int mstmm_at_laws_rates(mstmm_state *state, int index)
 {
     const mstmm_body *body = &state->model->bodies[index];
@@ -5193,7 +5193,7 @@ static int mstmm_at_laws_rates(mstmm_state *state, int index)
     return 0;
 }
 
-/* Slopes of a law along the unknowns of its speeds. */
+/* Derivatives of a law along the unknowns of its speeds. */
 static int mstmm_at_laws_own_slopes(mstmm_state *state, int index)
 {
     real d_tau[6];
@@ -5334,7 +5334,7 @@ static int mstmm_at_laws_factorise(mstmm_state *state, int index)
     return 0;
 }
 
-/* One column as efforts, and no load yet. */
+/* Efforts of one right-hand side; loads set to zero. */
 static int mstmm_at_laws_column(mstmm_state *state, int index)
 {
     const mstmm_body *body = &state->model->bodies[index];
@@ -5354,7 +5354,7 @@ static int mstmm_at_laws_column(mstmm_state *state, int index)
     return 0;
 }
 
-/* Change of the modes' load by increments that are known. */
+/* Change of the modal loads due to known increments. */
 static int mstmm_at_modes_change(mstmm_state *state, int index)
 {
     const mstmm_body *body = &state->model->bodies[index];
@@ -5369,7 +5369,7 @@ static int mstmm_at_modes_change(mstmm_state *state, int index)
     return 0;
 }
 
-/* The column's load carried across the hinge to the parent. */
+/* Load of the right-hand side carried across the hinge to the parent. */
 static int mstmm_at_laws_column_carried(mstmm_state *state, int index)
 {
     real e_c[6];
@@ -5428,7 +5428,7 @@ static int mstmm_at_laws_column_carried(mstmm_state *state, int index)
     return 0;
 }
 
-/* Accelerations that answer the column. */
+/* Accelerations due to the right-hand side. */
 static int mstmm_at_laws_column_answered(mstmm_state *state, int index)
 {
     real delta[6];
@@ -5481,7 +5481,7 @@ static int mstmm_at_laws_column_answered(mstmm_state *state, int index)
     return 0;
 }
 
-/* Inertia of a body and of all that hangs on it, carried to the parent. */
+/* Inertia of a body and its outboard part, carried to the parent. */
 static int mstmm_at_composed(mstmm_state *state, int index)
 {
     real unused_G[36];
@@ -5543,7 +5543,7 @@ int mstmm_at_lagged(mstmm_state *state, int index)
     return 0;
 }
 
-/* Change of a hinge's rates by that of its coordinates and speeds. */
+/* Change of the rates of a hinge by that of its coordinates and speeds. */
 int mstmm_at_rates_change(mstmm_state *state, int index)
 {
     const mstmm_body *body = &state->model->bodies[index];
@@ -5558,7 +5558,7 @@ int mstmm_at_rates_change(mstmm_state *state, int index)
     return 0;
 }
 
-/* Load of everything outboard under the hinge's given accelerations. */
+/* Load of the outboard part at the given accelerations of the hinge. */
 int mstmm_at_exerted(mstmm_state *state, int index)
 {
     const mstmm_body *body = &state->model->bodies[index];
@@ -5570,7 +5570,7 @@ int mstmm_at_exerted(mstmm_state *state, int index)
     return 0;
 }
 
-/* What one hinge feels of a load, and the load on the parent. */
+/* Efforts of a load along the speeds of one hinge, and the load on the parent. */
 int mstmm_at_felt_by(mstmm_state *state, int index)
 {
     real tau[6];
@@ -7470,7 +7470,7 @@ int mstmm_run_accelerations_in_plane(mstmm_state *state)
     return 0;
 }
 
-/* Efforts that given accelerations need beyond the laws' own. */
+/* Efforts required by given accelerations in addition to those of the laws. */
 int mstmm_run_inverse_dynamics(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
@@ -7537,7 +7537,7 @@ int mstmm_run_inverse_dynamics(mstmm_state *state)
     return 0;
 }
 
-/* The least change, by inertia, that closes gaps or stops slips of closed loops, and what a strike adds to it. */
+/* Smallest change, weighted by inertia, that removes position gaps or velocity errors of closed loops, and the contribution of an impact. */
 int mstmm_run_correction(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
@@ -7639,7 +7639,7 @@ int mstmm_run_motion(mstmm_state *state)
     return 0;
 }
 
-/* Poses alone, behind a sweep. */
+/* Poses only, after a sweep. */
 int mstmm_run_posed(mstmm_state *state)
 {
     int code;
@@ -7659,7 +7659,7 @@ int mstmm_run_factorisation(mstmm_state *state)
     return 0;
 }
 
-/* One column: accelerations that given efforts alone produce. */
+/* One right-hand side: accelerations due to given efforts only. */
 int mstmm_run_solution(mstmm_state *state)
 {
     int code;
@@ -7670,7 +7670,7 @@ int mstmm_run_solution(mstmm_state *state)
     return 0;
 }
 
-/* Derivative of the efforts that given accelerations need. */
+/* Derivative of the efforts required by given accelerations. */
 int mstmm_run_required_slope(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
@@ -7738,7 +7738,7 @@ int mstmm_run_required_slope(mstmm_state *state)
     return 0;
 }
 
-/* Derivative of what acts across the tree, and of the values of expressions. */
+/* Derivative of loads between branches of the tree, and of the values of expressions. */
 int mstmm_run_applied_slope(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
@@ -7803,7 +7803,7 @@ int mstmm_run_applied_slope(mstmm_state *state)
     return 0;
 }
 
-/* Tangent of inverse dynamics factored, behind inverse dynamics itself. */
+/* Tangent of inverse dynamics factored, after inverse dynamics itself. */
 int mstmm_run_tangent(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
@@ -7830,7 +7830,7 @@ int mstmm_run_tangent(mstmm_state *state)
     return 0;
 }
 
-/* What the tangent is eliminated from, behind inverse dynamics. */
+/* Contributions to the tangent before elimination, after inverse dynamics. */
 int mstmm_run_tangent_brought(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
@@ -7857,7 +7857,7 @@ int mstmm_run_tangent_brought(mstmm_state *state)
     return 0;
 }
 
-/* One right-hand side through the factored tangent. */
+/* One right-hand side solved with the factored tangent. */
 int mstmm_run_tangent_solution(mstmm_state *state)
 {
     int code;
@@ -7879,7 +7879,7 @@ int mstmm_run_tangent_solution(mstmm_state *state)
     return 0;
 }
 
-/* One right-hand side through the factored tangent, parts of the increments being known. */
+/* One right-hand side solved with the factored tangent and known increments. */
 int mstmm_run_tangent_beyond(mstmm_state *state)
 {
     int code;
@@ -7890,7 +7890,7 @@ int mstmm_run_tangent_beyond(mstmm_state *state)
     return 0;
 }
 
-/* The mass matrix and the slopes of laws factored, behind inverse dynamics. */
+/* Mass matrix and derivatives of laws factored, after inverse dynamics. */
 int mstmm_run_laws_alone(mstmm_state *state)
 {
     int code;
@@ -7899,7 +7899,7 @@ int mstmm_run_laws_alone(mstmm_state *state)
     return 0;
 }
 
-/* One right-hand side through the mass matrix with laws. */
+/* One right-hand side solved with the mass matrix and laws. */
 int mstmm_run_laws_solution(mstmm_state *state)
 {
     int code;
@@ -7910,7 +7910,7 @@ int mstmm_run_laws_solution(mstmm_state *state)
     return 0;
 }
 
-/* Inertia of everything outboard of each hinge, as if no hinge moved. */
+/* Inertia of the outboard part of each hinge, all hinges at rest. */
 int mstmm_run_composition(mstmm_state *state)
 {
     int code;

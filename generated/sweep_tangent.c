@@ -125,7 +125,7 @@ int mstmm_sweep_tangent_invert_sized(int n, const real *restrict D, const real *
 int mstmm_sweep_tangent_invert(int n, const real *restrict D, const real *restrict one,
     real *restrict inverse, real *restrict work)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_sweep_tangent_invert_sized(1, D, one, inverse, work);
     case 2: return mstmm_sweep_tangent_invert_sized(2, D, one, inverse, work);
     case 3: return mstmm_sweep_tangent_invert_sized(3, D, one, inverse, work);
@@ -159,17 +159,17 @@ static const mstmm_guard mstmm_sweep_tangent_invert_guards[] = {
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  H[6][n] motion subspace of the unknowns
  * in  B[n][9] motion along the unknowns
- * in  G[n][6] change of the load that is carried
- * in  W[n][n] slopes of the rows, a row a direction
- * in  S[9][6] change of the load by that of the motion, a row an entry
+ * in  G[n][6] change of the carried load
+ * in  W[n][n] derivatives of the rows, one row per direction
+ * in  S[9][6] change of the load by that of the motion, one row per entry
  * in  K[n][6] own load along the unknowns
- * in  Z_z[9][n] own rows by the motion, a row an entry
- * in  Z_x[n][n] own rows by the unknowns, a row a direction
+ * in  Z_z[9][n] own rows by the motion, one row per entry
+ * in  Z_x[n][n] own rows by the unknowns, one row per direction
  * out V[6][n] K + G
  * out D[n][n] rows by unknowns
  * out right[n][9] rows by the motion
  * out gain[n][9] D^-1 times the rows by the motion
- * out S_c[9][6] S without the unknowns, a row an entry
+ * out S_c[9][6] S without the unknowns, one row per entry
  * out work[n][n] factor L, D of solve
  */
 static inline __attribute__((always_inline))
@@ -979,7 +979,7 @@ int mstmm_sweep_tangent_node(int n, const real *restrict H, const real *restrict
     const real *restrict Z_z, const real *restrict Z_x, real *restrict V, real *restrict D,
     real *restrict right, real *restrict gain, real *restrict S_c, real *restrict work)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_sweep_tangent_node_sized(1, H, B, G, W, S, K, Z_z, Z_x, V, D, right, gain, S_c, work);
     case 2: return mstmm_sweep_tangent_node_sized(2, H, B, G, W, S, K, Z_z, Z_x, V, D, right, gain, S_c, work);
     case 3: return mstmm_sweep_tangent_node_sized(3, H, B, G, W, S, K, Z_z, Z_x, V, D, right, gain, S_c, work);
@@ -1018,17 +1018,17 @@ static const mstmm_guard mstmm_sweep_tangent_node_guards[] = {
     {2, "the determinant is negative; all results are there"},
 };
 
-/* what hangs on a port, as the unknowns of its body see it
+/* part outboard of a port, along the unknowns of its body
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][n] motion subspace of the unknowns
  * in  B[n][9] motion along the unknowns
- * in  G[n][6] change of the load that is carried
- * in  W[n][n] slopes of the rows, a row a direction
- * in  S[9][6] change of the load by that of the motion, a row an entry
- * in  T[9][6] S Th, a row an entry
+ * in  G[n][6] change of the carried load
+ * in  W[n][n] derivatives of the rows, one row per direction
+ * in  S[9][6] change of the load by that of the motion, one row per entry
+ * in  T[9][6] S Th, one row per entry
  * out K_x[6][n] S B
  * out K[n][6], added to what is there
  * out Z_z[9][n], added to what is there
@@ -1431,7 +1431,7 @@ int mstmm_sweep_tangent_absorb(int n, const real *restrict Rc, const real *restr
     const real *restrict S, const real *restrict T, real *restrict K_x, real *restrict K,
     real *restrict Z_z, real *restrict Z_x)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_sweep_tangent_absorb_sized(1, Rc, r, H, B, G, W, S, T, K_x, K, Z_z, Z_x);
     case 2: return mstmm_sweep_tangent_absorb_sized(2, Rc, r, H, B, G, W, S, T, K_x, K, Z_z, Z_x);
     case 3: return mstmm_sweep_tangent_absorb_sized(3, Rc, r, H, B, G, W, S, T, K_x, K, Z_z, Z_x);
@@ -1471,8 +1471,8 @@ static const mstmm_port mstmm_sweep_tangent_absorb_outputs[] = {
  * in  D[n][n] rows by unknowns
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  e_f[n] load of the rows
- * out rest[n] what is left of the rows
- * out y[n] D^-1 times what is left of the rows
+ * out rest[n] the remainder of the rows
+ * out y[n] D^-1 times the remainder of the rows
  * out e_c[6] (N, N*m) load without the unknowns
  * out work[n][n] factor L, D of solve
  */
@@ -1550,7 +1550,7 @@ int mstmm_sweep_tangent_push(int n, const real *restrict H, const real *restrict
     const real *restrict D, const real *restrict e, const real *restrict e_f, real *restrict rest,
     real *restrict y, real *restrict e_c, real *restrict work)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_sweep_tangent_push_sized(1, H, V, D, e, e_f, rest, y, e_c, work);
     case 2: return mstmm_sweep_tangent_push_sized(2, H, V, D, e, e_f, rest, y, e_c, work);
     case 3: return mstmm_sweep_tangent_push_sized(3, H, V, D, e, e_f, rest, y, e_c, work);
@@ -1584,12 +1584,12 @@ static const mstmm_guard mstmm_sweep_tangent_push_guards[] = {
     {2, "the determinant is negative; all results are there"},
 };
 
-/* unknowns that answer a right-hand side
+/* solution for a right-hand side
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  B[n][9] motion along the unknowns
  * in  gain[n][9] D^-1 times the rows by the motion
- * in  y[n] D^-1 times what is left of the rows
+ * in  y[n] D^-1 times the remainder of the rows
  * in  z_c[9] change of motion without the unknowns' part
  * out x[n] unknowns
  * out z[9] change of the body's motion, own axes
@@ -1688,7 +1688,7 @@ int mstmm_sweep_tangent_answer_sized(int n, const real *restrict B, const real *
 int mstmm_sweep_tangent_answer(int n, const real *restrict B, const real *restrict gain,
     const real *restrict y, const real *restrict z_c, real *restrict x, real *restrict z)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_sweep_tangent_answer_sized(1, B, gain, y, z_c, x, z);
     case 2: return mstmm_sweep_tangent_answer_sized(2, B, gain, y, z_c, x, z);
     case 3: return mstmm_sweep_tangent_answer_sized(3, B, gain, y, z_c, x, z);
@@ -1795,7 +1795,7 @@ int mstmm_sweep_tangent_displaced_sized(int n, const real *restrict B, const rea
 int mstmm_sweep_tangent_displaced(int n, const real *restrict B, const real *restrict x,
     const real *restrict z_c, real *restrict z)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_sweep_tangent_displaced_sized(1, B, x, z_c, z);
     case 2: return mstmm_sweep_tangent_displaced_sized(2, B, x, z_c, z);
     case 3: return mstmm_sweep_tangent_displaced_sized(3, B, x, z_c, z);
@@ -1821,9 +1821,9 @@ static const mstmm_port mstmm_sweep_tangent_displaced_outputs[] = {
 
 /* change of coordinates by that of their rates
  * in  sq[1] (1/s) inverse time of the step
- * in  kappa[1] 1 where the rates' own slopes count
+ * in  kappa[1] 1 to include the derivatives of the rates
  * in  one[n][n] unit matrix
- * in  g_q[n][n] slopes of the rates by the coordinates, a row a direction
+ * in  g_q[n][n] derivatives of the rates by the coordinates, one row per direction
  * out A[n][n] sq 1 - kappa g_q
  * out Q[n][n] its inverse
  * out work[n][n] factor L, D of solve
@@ -1852,7 +1852,7 @@ int mstmm_sweep_tangent_lag(int n, const real *restrict sq, const real *restrict
     const real *restrict one, const real *restrict g_q, real *restrict A, real *restrict Q,
     real *restrict work)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_sweep_tangent_lag_sized(1, sq, kappa, one, g_q, A, Q, work);
     case 2: return mstmm_sweep_tangent_lag_sized(2, sq, kappa, one, g_q, A, Q, work);
     case 3: return mstmm_sweep_tangent_lag_sized(3, sq, kappa, one, g_q, A, Q, work);
@@ -1907,7 +1907,7 @@ int mstmm_sweep_tangent_lagged_sized(int n, const real *restrict Q, const real *
 int mstmm_sweep_tangent_lagged(int n, const real *restrict Q, const real *restrict rate,
     real *restrict dq)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_sweep_tangent_lagged_sized(1, Q, rate, dq);
     case 2: return mstmm_sweep_tangent_lagged_sized(2, Q, rate, dq);
     case 3: return mstmm_sweep_tangent_lagged_sized(3, Q, rate, dq);
@@ -1930,12 +1930,12 @@ static const mstmm_port mstmm_sweep_tangent_lagged_outputs[] = {
     {"dq", 1, "", 0, 1},
 };
 
-/* rows of a hinge by the change of place
+/* rows of a hinge by the change of pose
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  H[6][n] motion subspace of the unknowns
- * in  S_p[9][6] change of the load by the place, a row an entry
- * out Z_p[9][n] rows by the place, a row an entry
+ * in  S_p[9][6] change of the load by the pose, one row per entry
+ * out Z_p[9][n] rows by the pose, one row per entry
  */
 static inline __attribute__((always_inline))
 int mstmm_sweep_tangent_placed_rows_sized(int n, const real *restrict H, const real *restrict S_p,
@@ -2073,7 +2073,7 @@ int mstmm_sweep_tangent_placed_rows_sized(int n, const real *restrict H, const r
 int mstmm_sweep_tangent_placed_rows(int n, const real *restrict H, const real *restrict S_p,
     real *restrict Z_p)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_sweep_tangent_placed_rows_sized(1, H, S_p, Z_p);
     case 2: return mstmm_sweep_tangent_placed_rows_sized(2, H, S_p, Z_p);
     case 3: return mstmm_sweep_tangent_placed_rows_sized(3, H, S_p, Z_p);
@@ -2096,12 +2096,12 @@ static const mstmm_port mstmm_sweep_tangent_placed_rows_outputs[] = {
     {"Z_p", 9, "", 0, 1},
 };
 
-/* load and rows along the unknowns by the change of place
+/* load and rows along the unknowns by the change of pose
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  B_p[n][9] change of place along the unknowns
- * in  S_p[9][6] change of the load by the place, a row an entry
- * in  Z_p[9][n] own rows by the place, a row an entry
+ * in  B_p[n][9] change of pose along the unknowns
+ * in  S_p[9][6] change of the load by the pose, one row per entry
+ * in  Z_p[9][n] own rows by the pose, one row per entry
  * out K[n][6], added to what is there
  * out Z_x[n][n], added to what is there
  */
@@ -2257,7 +2257,7 @@ int mstmm_sweep_tangent_placed_own_sized(int n, const real *restrict B_p, const 
 int mstmm_sweep_tangent_placed_own(int n, const real *restrict B_p, const real *restrict S_p,
     const real *restrict Z_p, real *restrict K, real *restrict Z_x)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_sweep_tangent_placed_own_sized(1, B_p, S_p, Z_p, K, Z_x);
     case 2: return mstmm_sweep_tangent_placed_own_sized(2, B_p, S_p, Z_p, K, Z_x);
     case 3: return mstmm_sweep_tangent_placed_own_sized(3, B_p, S_p, Z_p, K, Z_x);
@@ -2282,14 +2282,14 @@ static const mstmm_port mstmm_sweep_tangent_placed_own_outputs[] = {
     {"Z_x", 1, "", 1, 2},
 };
 
-/* unknowns of a hinge eliminated from loads by place
+/* unknowns of a hinge eliminated from loads by the pose
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  inverse[n][n] D^-1
- * in  Z_p[9][n] own rows by the place, a row an entry
- * in  V[n][6] K + G, a row a direction
- * out gain[n][9] D^-1 times the rows by the place
- * out S_p[9][6] change of the load by the place, a row an entry, added to what is there
+ * in  Z_p[9][n] own rows by the pose, one row per entry
+ * in  V[n][6] K + G, one row per direction
+ * out gain[n][9] D^-1 times the rows by the pose
+ * out S_p[9][6] change of the load by the pose, one row per entry, added to what is there
  */
 static inline __attribute__((always_inline))
 int mstmm_sweep_tangent_placed_reduce_sized(int n, const real *restrict inverse,
@@ -2751,7 +2751,7 @@ int mstmm_sweep_tangent_placed_reduce_sized(int n, const real *restrict inverse,
 int mstmm_sweep_tangent_placed_reduce(int n, const real *restrict inverse, const real *restrict Z_p,
     const real *restrict V, real *restrict gain, real *restrict S_p)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_sweep_tangent_placed_reduce_sized(1, inverse, Z_p, V, gain, S_p);
     case 2: return mstmm_sweep_tangent_placed_reduce_sized(2, inverse, Z_p, V, gain, S_p);
     case 3: return mstmm_sweep_tangent_placed_reduce_sized(3, inverse, Z_p, V, gain, S_p);
@@ -2776,17 +2776,17 @@ static const mstmm_port mstmm_sweep_tangent_placed_reduce_outputs[] = {
     {"S_p", 54, "", 1, 0},
 };
 
-/* unknowns of a flexible body eliminated from loads by place
+/* unknowns of a flexible body eliminated from loads by the pose
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  H[6][n] motion subspace of the unknowns
  * in  V[6][n] K + G
  * in  D[n][n] rows by unknowns
- * in  S_p[9][6] change of the load by the place, a row an entry
- * in  Z_p[9][n] own rows by the place, a row an entry
- * out right[n][9] rows by the place
- * out gain[n][9] D^-1 times the rows by the place
- * out S_c[9][6] S_p without the unknowns, a row an entry
+ * in  S_p[9][6] change of the load by the pose, one row per entry
+ * in  Z_p[9][n] own rows by the pose, one row per entry
+ * out right[n][9] rows by the pose
+ * out gain[n][9] D^-1 times the rows by the pose
+ * out S_c[9][6] S_p without the unknowns, one row per entry
  * out work[n][n] factor L, D of solve
  */
 static inline __attribute__((always_inline))
@@ -3318,7 +3318,7 @@ int mstmm_sweep_tangent_placed_node(int n, const real *restrict H, const real *r
     const real *restrict D, const real *restrict S_p, const real *restrict Z_p,
     real *restrict right, real *restrict gain, real *restrict S_c, real *restrict work)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_sweep_tangent_placed_node_sized(1, H, V, D, S_p, Z_p, right, gain, S_c, work);
     case 2: return mstmm_sweep_tangent_placed_node_sized(2, H, V, D, S_p, Z_p, right, gain, S_c, work);
     case 3: return mstmm_sweep_tangent_placed_node_sized(3, H, V, D, S_p, Z_p, right, gain, S_c, work);
@@ -3352,15 +3352,15 @@ static const mstmm_guard mstmm_sweep_tangent_placed_node_guards[] = {
     {2, "the determinant is negative; all results are there"},
 };
 
-/* loads by place of what hangs on a port, as the unknowns of its body see them
+/* loads by the pose of the part outboard of a port, along the unknowns of its body
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][n] motion subspace of the unknowns
- * in  B_p[n][9] change of place along the unknowns
- * in  S_p[9][6] change of the load by the place, a row an entry
- * in  T_p[9][6] S_p Th_p, a row an entry
+ * in  B_p[n][9] change of pose along the unknowns
+ * in  S_p[9][6] change of the load by the pose, one row per entry
+ * in  T_p[9][6] S_p Th_p, one row per entry
  * out K[n][6], added to what is there
  * out Z_p[9][n], added to what is there
  * out Z_x[n][n], added to what is there
@@ -4170,7 +4170,7 @@ int mstmm_sweep_tangent_placed_absorb(int n, const real *restrict Rc, const real
     const real *restrict H, const real *restrict B_p, const real *restrict S_p,
     const real *restrict T_p, real *restrict K, real *restrict Z_p, real *restrict Z_x)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_sweep_tangent_placed_absorb_sized(1, Rc, r, H, B_p, S_p, T_p, K, Z_p, Z_x);
     case 2: return mstmm_sweep_tangent_placed_absorb_sized(2, Rc, r, H, B_p, S_p, T_p, K, Z_p, Z_x);
     case 3: return mstmm_sweep_tangent_placed_absorb_sized(3, Rc, r, H, B_p, S_p, T_p, K, Z_p, Z_x);
@@ -4199,12 +4199,12 @@ static const mstmm_port mstmm_sweep_tangent_placed_absorb_outputs[] = {
     {"Z_x", 1, "", 1, 2},
 };
 
-/* rows less what the change of place makes of them
+/* rows less their change by the change of pose
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  gain[n][9] D^-1 times the rows by the place
- * in  p[9] change of place: turn, place and velocity of P, own axes
- * out y[n] what is left of the rows, added to what is there
+ * in  gain[n][9] D^-1 times the rows by the pose
+ * in  p[9] change of pose: rotation, position and velocity of P, own axes
+ * out y[n] the remainder of the rows, added to what is there
  */
 static inline __attribute__((always_inline))
 int mstmm_sweep_tangent_placed_left_sized(int n, const real *restrict gain, const real *restrict p,
@@ -4237,7 +4237,7 @@ int mstmm_sweep_tangent_placed_left_sized(int n, const real *restrict gain, cons
 int mstmm_sweep_tangent_placed_left(int n, const real *restrict gain, const real *restrict p,
     real *restrict y)
 {
-    switch (n) { /* loops over a number that is known are unrolled */
+    switch (n) { /* loops over a known number are unrolled */
     case 1: return mstmm_sweep_tangent_placed_left_sized(1, gain, p, y);
     case 2: return mstmm_sweep_tangent_placed_left_sized(2, gain, p, y);
     case 3: return mstmm_sweep_tangent_placed_left_sized(3, gain, p, y);
@@ -4281,7 +4281,7 @@ static const mstmm_kernel mstmm_sweep_tangent_kernels[] = {
         .n_outputs = 6,
         .inputs = mstmm_sweep_tangent_node_inputs,
         .outputs = mstmm_sweep_tangent_node_outputs,
-        .ir_hash = "08ff4b38e479f3c046f9085bd9384e3d09836c959c50b18d464949b675ae7b9b",
+        .ir_hash = "356bbc010f8ea4859a8714c4860e9db92ee426ef185f1ba4b6578958b2429ecf",
         .n_guards = 2,
         .guards = mstmm_sweep_tangent_node_guards,
     },
@@ -4293,7 +4293,7 @@ static const mstmm_kernel mstmm_sweep_tangent_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_sweep_tangent_absorb_inputs,
         .outputs = mstmm_sweep_tangent_absorb_outputs,
-        .ir_hash = "cf83d1c40fe2c7e84751c396ce27cff55c4e76c8fa168e6629280b3d84dc56b2",
+        .ir_hash = "58d4f081a0a0d48d59b6cc77a64b9df159e58620288a906c0bff2989f4c2931b",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4305,7 +4305,7 @@ static const mstmm_kernel mstmm_sweep_tangent_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_sweep_tangent_push_inputs,
         .outputs = mstmm_sweep_tangent_push_outputs,
-        .ir_hash = "6a634f9014a00b11d154dc54d30d76f666c770d276a3a47c042b04f8c97d5da0",
+        .ir_hash = "93fa07371f995f9d67c5dce886a735090d30820051959988ec306d2070159cd4",
         .n_guards = 2,
         .guards = mstmm_sweep_tangent_push_guards,
     },
@@ -4317,7 +4317,7 @@ static const mstmm_kernel mstmm_sweep_tangent_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_tangent_answer_inputs,
         .outputs = mstmm_sweep_tangent_answer_outputs,
-        .ir_hash = "1e181ce882d6e88d1c6c0e7834787fcf7c02a69a044ae3aa57c275ae5191d6d6",
+        .ir_hash = "47b3b2bfbf2a0ace5733dd01230cb59ea289dd723de4289f8c793054b79e71da",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4341,7 +4341,7 @@ static const mstmm_kernel mstmm_sweep_tangent_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_tangent_lag_inputs,
         .outputs = mstmm_sweep_tangent_lag_outputs,
-        .ir_hash = "ab7ccaaf68e860a935ad491f961210f5ccaa4d6a5547754d4457322e781fce0e",
+        .ir_hash = "3b47269de2f407556476c1d5c6a2873591c152a6a458d76748533471b57fec90",
         .n_guards = 2,
         .guards = mstmm_sweep_tangent_lag_guards,
     },
@@ -4365,7 +4365,7 @@ static const mstmm_kernel mstmm_sweep_tangent_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_tangent_placed_rows_inputs,
         .outputs = mstmm_sweep_tangent_placed_rows_outputs,
-        .ir_hash = "666189d6791c294a3d3daff68cc94df2e7dd252a3766a06d21432f5f04603a1e",
+        .ir_hash = "fae39a1c1e9f8dc8418142c9f00807f3bf6d446c3a2d95a10d03de53a88d7103",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4377,7 +4377,7 @@ static const mstmm_kernel mstmm_sweep_tangent_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_tangent_placed_own_inputs,
         .outputs = mstmm_sweep_tangent_placed_own_outputs,
-        .ir_hash = "889aae21ede678902d2bd635d9d13a3d782b87ef32d24a32160cc561bf47f5fc",
+        .ir_hash = "0d62b9f1919cb7503db560ee181638ad0112335a8408316d1209a9b3b0878cf6",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4389,7 +4389,7 @@ static const mstmm_kernel mstmm_sweep_tangent_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_tangent_placed_reduce_inputs,
         .outputs = mstmm_sweep_tangent_placed_reduce_outputs,
-        .ir_hash = "c6deaa0d6de6f47ebd00356a88aa9ff43c9bda1a2d42252bc6e219f61b0a7ce0",
+        .ir_hash = "caf068e2e8fb9f285f58cbb22b580ecb2753bce4080d7ed53657b4267c7458d5",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4401,7 +4401,7 @@ static const mstmm_kernel mstmm_sweep_tangent_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_sweep_tangent_placed_node_inputs,
         .outputs = mstmm_sweep_tangent_placed_node_outputs,
-        .ir_hash = "36f21af23eab8677ed1e8d4d43ed60ccc1f43281b1887fa14678daa9cf4e67de",
+        .ir_hash = "a6483a806e95a7b0a6b1c0cb9c450e8fa3cf18f2a33aa71406526de7f921da5d",
         .n_guards = 2,
         .guards = mstmm_sweep_tangent_placed_node_guards,
     },
@@ -4413,7 +4413,7 @@ static const mstmm_kernel mstmm_sweep_tangent_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_tangent_placed_absorb_inputs,
         .outputs = mstmm_sweep_tangent_placed_absorb_outputs,
-        .ir_hash = "8da0468ba31e903e2984c69ed715263c2222b13102544fea23714c01cd137c00",
+        .ir_hash = "396c7eae507dff6d9d48969ba41934dfed2a6beb86f6de36ae4416b45b4e17a1",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4425,7 +4425,7 @@ static const mstmm_kernel mstmm_sweep_tangent_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_tangent_placed_left_inputs,
         .outputs = mstmm_sweep_tangent_placed_left_outputs,
-        .ir_hash = "49ae35f10bd8c4177dd7e075c31abfcb349ec00d419f49c60205fcca42dca172",
+        .ir_hash = "dafc9d3445050c0b3a8653de927ece7a89c146e45dc34daf371e581332bdaeee",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4435,7 +4435,7 @@ const mstmm_element mstmm_sweep_tangent = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "tangent",
-    .hash = "1fcdf7959ad449b7a49d4c01cb3dfe022d6557de87946388ffad01b56429a8bb",
+    .hash = "a25d08a15efaebb5a28a72433479e17af8317b7bc37a4ea0f390f1c5d7a2f17f",
     .nq = 0,
     .nu = 0,
     .np = 0,

@@ -39,15 +39,18 @@ if TYPE_CHECKING:
     from .pipeline.report.report import write_report
     from .runtime.advice.advice import Advice
     from .runtime.chart.chart import Chart
+    from .runtime.integrate import methods
+    from .runtime.model.execution import Execution
     from .runtime.model.model import Model
     from .runtime.model.result_loading import load_result
+    from .runtime.model.target_error.error_request import ErrorRequest
     from .runtime.result.result import Result
     from .scene import Scene
     from .scene.load import load_scene
     from .scene.robots.formats import import_robot
     from .scene.robots.robot_from_scene import export_robot
 
-#: Public name -> (module, name there).
+#: Public name -> (module, name there; "" for the module itself).
 _LAZY = {
     "Scene": (".scene", "Scene"),
     "load_scene": (".scene.load", "load_scene"),
@@ -62,6 +65,9 @@ _LAZY = {
     "generate_file": (".pipeline.compilation", "generate_file"),
     "Advice": (".runtime.advice.advice", "Advice"),
     "Chart": (".runtime.chart.chart", "Chart"),
+    "methods": (".runtime.integrate.methods", ""),
+    "Execution": (".runtime.model.execution", "Execution"),
+    "ErrorRequest": (".runtime.model.target_error.error_request", "ErrorRequest"),
     "Model": (".runtime.model.model", "Model"),
     "Result": (".runtime.result.result", "Result"),
     "load_result": (".runtime.model.result_loading", "load_result"),
@@ -75,6 +81,8 @@ __all__ = [
     "Chart",
     "ElementError",
     "EnvironmentFailure",
+    "ErrorRequest",
+    "Execution",
     "ExpressionError",
     "Model",
     "MstmmError",
@@ -92,6 +100,7 @@ __all__ = [
     "import_robot",
     "load_result",
     "load_scene",
+    "methods",
     "register",
     "stability",
     "write_report",
@@ -104,7 +113,8 @@ if not TYPE_CHECKING:  # a type checker would accept any name
         if name not in _LAZY:
             raise AttributeError(f"module 'mstmm' has no attribute {name!r}")
         module, attribute = _LAZY[name]
-        value = getattr(import_module(module, __name__), attribute)
+        loaded = import_module(module, __name__)
+        value = getattr(loaded, attribute) if attribute else loaded
         globals()[name] = value
         return value
 

@@ -72,7 +72,7 @@ def finite_array(name: str, value: ArrayLike) -> Array:
 
 
 def _is_surely_finite(array: Array) -> bool:
-    """Whether few numbers are finite, by a sum of small parts: fast, and without overflow."""
+    """Fast one-sided test: True only for a short array whose values are all finite."""
     row = array if array.ndim == 1 else array.ravel()
     return row.size <= _SMALL_WEIGHTS.size and math.isfinite(row.dot(_SMALL_WEIGHTS[: row.size]))
 

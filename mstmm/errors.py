@@ -66,7 +66,7 @@ class UndeterminedMotionError(NumericalFailure):
 
 
 class RiskRefused(NumericalFailure):
-    """Run rejected because of its risks (`on_risk="refuse"`).
+    """Run rejected because of its risks (`Execution(on_risk="refuse")`).
 
     `risks` are the objections (`mstmm.risk.Risk`); `result` is the result that was computed, None
     if they were found before the run.

@@ -7,11 +7,12 @@ findings as rows of this one type.  docs/howto/warnings.md lists their names.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, field
 from numbers import Real
 from typing import Any
 
 from .notebook_html import NotebookDisplay, bullets, text
+from .plain_data import from_plain, stored_as, to_plain
 
 #: Reactions of a run to its risks.
 ON_RISK = ("warn", "refuse", "ignore")
@@ -27,37 +28,37 @@ class Risk:
     Attributes:
         name: of the kind, such as "step-stability".
         element: element concerned, such as 'hinge "elbow"'; RUN for the run as a whole.
-        means: the finding and its consequence, a sentence without a full stop.
+        description: the finding and its consequence, a sentence without a full stop.
         remedy: how to resolve or check it.
-        figure, limit: value found, and the limit beyond which it is a risk; None without a number.
+        value, limit: value found, and the limit beyond which it is a risk; None without a number.
         unit: of both; "1" for ratios.
-        doubt: whether it is an objection to the numbers; otherwise it is only information.
-        before: whether it was found before the run, in the scene and its initial state.
+        invalidates: whether it is an objection to the numbers; otherwise it is only information.
+        seen_before_run: whether it was found before the run, in the scene and its initial state.
     """
 
     name: str
     element: str
-    means: str
+    description: str = field(metadata=stored_as("means"))
     remedy: str
-    figure: float | None = None
+    value: float | None = field(default=None, metadata=stored_as("figure"))
     limit: float | None = None
     unit: str = "1"
-    doubt: bool = True
-    before: bool = False
+    invalidates: bool = field(default=True, metadata=stored_as("doubt"))
+    seen_before_run: bool = field(default=False, metadata=stored_as("before"))
 
     def __post_init__(self) -> None:
-        for name in ("figure", "limit"):  # plain numbers, whatever type they were computed in
+        for name in ("value", "limit"):  # plain numbers, whatever type they were computed in
             value = getattr(self, name)
             if isinstance(value, Real):
                 object.__setattr__(self, name, float(value))
 
     def __str__(self) -> str:
-        return f"{self.means}; {self.remedy}"
+        return f"{self.description}; {self.remedy}"
 
 
 def information(name: str, element: str, means: str, remedy: str) -> Risk:
     """Create a risk that is information, no objection to the numbers."""
-    return Risk(name, element, means, remedy, doubt=False)
+    return Risk(name, element, means, remedy, invalidates=False)
 
 
 def sentences(risks: Iterable[Risk]) -> tuple[str, ...]:
@@ -71,11 +72,13 @@ def order_risks(found: Iterable[Risk]) -> tuple[Risk, ...]:
     A finding made both before and during a run keeps only the later row.
     """
     rows = tuple(dict.fromkeys(found))
-    run_keys = {(risk.name, risk.element) for risk in rows if not risk.before}
+    run_keys = {(risk.name, risk.element) for risk in rows if not risk.seen_before_run}
     remaining = (
-        risk for risk in rows if not risk.before or (risk.name, risk.element) not in run_keys
+        risk
+        for risk in rows
+        if not risk.seen_before_run or (risk.name, risk.element) not in run_keys
     )
-    return tuple(sorted(remaining, key=lambda risk: not risk.doubt))
+    return tuple(sorted(remaining, key=lambda risk: not risk.invalidates))
 
 
 class DeferredRisks:
@@ -83,18 +86,18 @@ class DeferredRisks:
 
     def __init__(self, find: Callable[[], Iterable[Risk]]) -> None:
         self._find: Callable[[], Iterable[Risk]] | None = find
-        self._found: tuple[Risk, ...] = ()
+        self._risks: tuple[Risk, ...] = ()
 
     def __iter__(self) -> Iterator[Risk]:
         if self._find is not None:
-            self._found, self._find = tuple(self._find()), None
-        return iter(self._found)
+            self._risks, self._find = tuple(self._find()), None
+        return iter(self._risks)
 
     def __reduce__(self) -> tuple[type[tuple[Risk, ...]], tuple[tuple[Risk, ...]]]:
         return tuple, (tuple(self),)
 
 
-class AssessedAnswer(NotebookDisplay):
+class AssessedResult(NotebookDisplay):
     """Base class of answers that report their reliability.
 
     A subclass provides `findings`, the rows of its checks, in any order.
@@ -115,16 +118,16 @@ class AssessedAnswer(NotebookDisplay):
     @property
     def trusted(self) -> bool:
         """True if no risk is an objection to the numbers."""
-        return not any(risk.doubt for risk in self.risks)
+        return not any(risk.invalidates for risk in self.risks)
 
     @property
     def verdict(self) -> str:
         """Whether the answer can be trusted, and if not why, in one sentence."""
-        objections = [risk for risk in self.risks if risk.doubt]
+        objections = [risk for risk in self.risks if risk.invalidates]
         if not objections:
             return "trusted: no check objects to it"
         suffix = f" (and {len(objections) - 1} more)" if len(objections) > 1 else ""
-        return f"NOT trusted: {objections[0].means}{suffix}"
+        return f"NOT trusted: {objections[0].description}{suffix}"
 
     def assessment(self) -> dict[str, Any]:
         """Verdict and risks as plain data, for files and JSON output."""
@@ -138,17 +141,18 @@ class AssessedAnswer(NotebookDisplay):
 
 def to_rows(risks: Iterable[Risk]) -> list[dict[str, Any]]:
     """Convert risks to plain data, for files."""
-    return [asdict(risk) for risk in risks]
+    return [to_plain(risk) for risk in risks]
 
 
 def from_rows(rows: Iterable[Mapping[str, Any]]) -> tuple[Risk, ...]:
     """Restore risks from the result of `to_rows`.  TypeError for values of other types."""
-    risks = tuple(Risk(**row) for row in rows)
+    risks = tuple(from_plain(Risk, row) for row in rows)
     for risk in risks:
-        texts = (risk.name, risk.element, risk.means, risk.remedy, risk.unit)
-        numbers = (risk.figure, risk.limit)
+        texts = (risk.name, risk.element, risk.description, risk.remedy, risk.unit)
+        numbers = (risk.value, risk.limit)
         if not all(isinstance(word, str) for word in texts) or not all(
-            x is None or isinstance(x, (int, float)) for x in (*numbers, risk.doubt, risk.before)
+            x is None or isinstance(x, (int, float))
+            for x in (*numbers, risk.invalidates, risk.seen_before_run)
         ):
             raise TypeError("a risk holds values other than texts and numbers")
     return risks

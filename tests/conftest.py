@@ -6,7 +6,12 @@ import importlib.util
 import os
 import signal
 import tempfile
+from collections import Counter
 from collections.abc import Iterator
+
+# Tests run side by side, one a core: threads of linear algebra would only wait for each other.
+# numpy reads this when it is imported.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 import pytest
@@ -29,19 +34,25 @@ settings.register_profile(
 settings.load_profile("mstmm")
 
 # The comparisons with other programs need those programs, which live in an environment of their
-# own (CONTRIBUTING.md, "Tests"); there `pytest tests/other_programs` runs them.
-collect_ignore = [] if importlib.util.find_spec("pinocchio") else ["other_programs"]
+# own (CONTRIBUTING.md, "Tests"); there `pytest tests/peers` runs them.
+collect_ignore = [] if importlib.util.find_spec("pinocchio") else ["peers"]
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_configure(config: pytest.Config) -> None:
-    """Hypothesis draws by the same seed, unless it is given one of its own."""
+    """Hypothesis draws by the same seed, unless it is given one of its own; pytest-xdist hands out
+    files in the order of `pytest_collection_modifyitems`, not by their numbers of tests."""
     if config.getoption("--hypothesis-seed") is None:
         config.option.hypothesis_seed = SEED
+    config.option.loadscopereorder = False
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Marks the tests that draw their data."""
+    """Marks the tests that draw their data.  Puts files with most slow tests first, then those with
+    most tests, so that no core waits for a long file at the end."""
+    slow = Counter(item.path for item in items if item.get_closest_marker("slow"))
+    tests = Counter(item.path for item in items)
+    items.sort(key=lambda item: (-slow[item.path], -tests[item.path], item.path))
     for item in items:
         if isinstance(item, pytest.Function) and (
             "rng" in item.fixturenames or is_hypothesis_test(item.obj)
@@ -61,7 +72,7 @@ def pytest_report_header() -> str:
 @pytest.fixture
 def rng(request: pytest.FixtureRequest) -> np.random.Generator:
     """Random numbers that depend on the run's seed and on the test's own name alone."""
-    return np.random.default_rng([SEED, *request.node.nodeid.encode()])
+    return np.random.default_rng([SEED, *request.node.name.encode()])
 
 
 @pytest.fixture

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parent.parent
+from tests.support.paths import ROOT
+
 FILES = sorted(path for path in (ROOT / "runtime").glob("**/c/*.[ch]"))
 _NO_CODE = re.compile(r'/\*.*?\*/|"(?:\\.|[^"\\\n])*"', re.DOTALL)
 #: A definition begins in the first column, and so does its brace, unless all is on one line.

@@ -12,6 +12,7 @@ import sys
 import tomllib
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from functools import cache
 from pathlib import Path
 
 import grimp
@@ -44,9 +45,20 @@ def python_files(room: str) -> list[Path]:
     )
 
 
-def imports(path: Path) -> Iterator[tuple[int, str]]:
+@cache
+def nodes(path: Path) -> list[ast.AST]:
+    """All nodes of a file."""
+    return list(ast.walk(ast.parse(path.read_text())))
+
+
+@cache
+def imports(path: Path) -> list[tuple[int, str]]:
     """(level, dotted name) of each import in a file, wherever in it; level 0 is absolute."""
-    for node in ast.walk(ast.parse(path.read_text())):
+    return list(_imports(path))
+
+
+def _imports(path: Path) -> Iterator[tuple[int, str]]:
+    for node in nodes(path):
         if isinstance(node, ast.Import):
             yield from ((0, alias.name) for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -261,7 +273,7 @@ def test_nothing_goes_by_the_name_of_a_hinge() -> None:
         for folder in folders
         for path in python_files(folder)
         if path.parent not in (ROOT / "derive" / "elements", ROOT / "derive" / "classical")
-        for node in ast.walk(ast.parse(path.read_text()))
+        for node in nodes(path)
         if isinstance(node, ast.expr) and by_name(node)
     ]
     assert not found

@@ -7,7 +7,7 @@ import sys
 import tomllib
 from pathlib import Path
 
-from support.c_library import compile_library
+from tests.support.kernels.c_library import compile_library
 
 ROOT = Path(__file__).parents[1]
 

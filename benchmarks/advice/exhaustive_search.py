@@ -22,7 +22,7 @@ from mstmm.runtime.advice.body_model_levels import (
     BodyModel,
 )
 from mstmm.runtime.advice.measure_renaming import Renaming
-from mstmm.runtime.chart.error_measure import Places
+from mstmm.runtime.chart.error_measure import PositionMeasure
 from mstmm.runtime.chart.method_families import PROMISING
 from mstmm.runtime.chart.model_levels import Variant, model_levels, with_tables
 from mstmm.runtime.chart.planar_model import planar_level
@@ -72,13 +72,16 @@ class Single:
         return f"{self.model}, {self.method} {self.rtol:.0e}"
 
 
-def timed(model: mstmm.Model, t_end: float, **options: Any) -> tuple[mstmm.Result, float] | None:
+def timed(
+    model: mstmm.Model, t_end: float, method: str, **options: Any
+) -> tuple[mstmm.Result, float] | None:
     """A run and the processor time of the call, with the elastic response where there is one; None
     where it does not reach the end."""
     times = np.linspace(0.0, t_end, SAMPLES)
+    limited = mstmm.methods.Method(method, max_steps=_MOST_STEPS)
     begin = time.process_time()
     try:
-        result = model.simulate(t_end, output_times=times, max_steps=_MOST_STEPS, **options)
+        result = model.simulate(t_end, limited, output_times=times, **options)
         if isinstance(result, OneWayResult) and result.success:
             _ = result.cost
     except mstmm.MstmmError:
@@ -96,7 +99,7 @@ def truth(scene: mstmm.Scene, t_end: float) -> Truth | None:
     """The richest model by two methods that agree best; None where no two reach the end."""
     top = model_levels(scene)[-1]
     model = mstmm.compile(top.scene, engine="looped")
-    measure = Renaming(Places(model, model.simulate(0.0)))
+    measure = Renaming(PositionMeasure(model, model.simulate(0.0)))
     found = _agreed(model, measure, t_end)
     if found is None:
         return None
@@ -109,14 +112,14 @@ def truth_in_parts(known: Truth, wholes: set[str], t_end: float) -> Truth | None
     """The same with beams that one frame cannot follow in sixteen welded parts each."""
     parts = split_beams(_divisible(known.base, wholes), wholes, _PARTS)
     model = mstmm.compile(parts.scene, engine="looped")
-    known.measure.know(model, parts.names)
+    known.measure.register(model, parts.names)
     found = _agreed(model, known.measure, t_end)
     return None if found is None else Truth(found[1], found[0], known.measure, known.base)
 
 
 def _divisible(scene: mstmm.Scene, wholes: set[str]) -> mstmm.Scene:
     """The scene whose beams have nothing that belongs to shapes of the whole."""
-    bodies = mstmm.compile(scene, engine="looped").flexible
+    bodies = mstmm.compile(scene, engine="looped").flexible_bodies
     beams = (
         make_splittable(beam, float(modal_frequencies(bodies[beam.name])[0]))[0]
         if beam.name in wholes
@@ -133,7 +136,7 @@ def _agreed(
     runs = [found[0] for name, rtol in _TRUTH if (found := single(model, t_end, name, rtol))]
     numbers = [measure.read(run) for run in runs]
     pairs = [
-        (float(measure.apart(a, b).max()), i)
+        (float(measure.distance(a, b).max()), i)
         for i, a in enumerate(numbers)
         for b in numbers[i + 1 :]
     ]
@@ -208,7 +211,7 @@ def _curves(
 
 
 def _error(known: Truth, result: mstmm.Result) -> float:
-    return float(known.measure.apart(known.measure.read(result), known.numbers).max())
+    return float(known.measure.distance(known.measure.read(result), known.numbers).max())
 
 
 def cheapest(made: list[Single], asked: float, sure: bool) -> Single | None:

@@ -100,11 +100,11 @@ def outcome(
     found = timed(ours_model, t_end, **advice.options)
     assert found is not None
     measure, truer = known.measure, known
-    measure.know(ours_model, advice.names)
-    if advice.parts:
-        truer = truth_in_parts(known, set(advice.parts.values()), t_end) or known
-    error = float(measure.apart(measure.read(found[0]), truer.numbers).max())
-    rivals = [None if advice.parts else cheapest(made, asked, sure) for sure in (True, False)]
+    measure.register(ours_model, advice.renamed_references)
+    if advice.beam_parts:
+        truer = truth_in_parts(known, set(advice.beam_parts.values()), t_end) or known
+    error = float(measure.distance(measure.read(found[0]), truer.numbers).max())
+    rivals = [None if advice.beam_parts else cheapest(made, asked, sure) for sure in (True, False)]
     scenes = dict(models(known.base))
     compiled = {
         one: mstmm.compile(scenes[one.model], engine="looped") for one in rivals if one is not None
@@ -119,12 +119,14 @@ def outcome(
             if run is not None:
                 theirs[one].append(run[1])
     times = [None if one is None else min(theirs[one]) for one in rivals]
-    changes = [text.partition(";")[0].partition(" with a frame")[0] for text in advice.changes]
-    advised = "; ".join([*(f"{b.name}: {b.choice}" for b in advice.bodies), *changes])
+    changes = [
+        text.partition(";")[0].partition(" with a frame")[0] for text in advice.other_changes
+    ]
+    advised = "; ".join([*(f"{b.name}: {b.model}" for b in advice.bodies), *changes])
     return Outcome(
         name, asked, error, advice.error, min(ours), None if rivals[0] is None else str(rivals[0]),
-        times[0], times[1], f"{advised}; {advice.method}, {advice.setting}", advice.whole, spent,
-        advice.model_saving,
+        times[0], times[1], f"{advised}; {advice.method}, {advice.setting}",
+        advice.covers_whole_run, spent, advice.model_saving,
     )  # fmt: skip
 
 

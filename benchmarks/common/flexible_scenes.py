@@ -18,7 +18,7 @@ class Spin:
         "mass_per_length": 1.2, "bending_stiffness": 1.4e4, "axial_stiffness": 2.8e7,
     }  # fmt: skip
     #: Largest deflection of the tip across the turning axis (m) and when (s): geometrically exact,
-    #: inextensible, spectral (tests/flexible/reference/inextensible.py).
+    #: inextensible, spectral (tests/reference/flexible/inextensible.py).
     LARGEST, AT = -0.57375, 6.762
     TURNED = "where(t < 15, 0.4*(t^2/2 + (15/(2*pi))^2*(cos(2*pi*t/15) - 1)), 6*(t - 7.5))"
 

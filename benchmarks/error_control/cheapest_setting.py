@@ -75,9 +75,8 @@ def single(
 ) -> tuple[mstmm.Result, float] | None:
     """One run of a method at a tolerance; None where it does not reach the end in `most` steps."""
     try:
-        result, spent = timed(
-            model, t_end, method=method, rtol=rtol, atol=ATOL_PART * rtol, max_steps=most
-        )
+        limited = mstmm.methods.Method(method, max_steps=most)
+        result, spent = timed(model, t_end, method=limited, rtol=rtol, atol=ATOL_PART * rtol)
     except mstmm.MstmmError:
         return None
     return (result, spent) if result.success else None
@@ -93,16 +92,16 @@ def reference(model: mstmm.Model, t_end: float) -> Reference | None:
     measure = Coordinates(model)
     pairs = []
     for a, q in runs.items():
-        measure.scale_by(q)
+        measure.set_scales(q)
         pairs += [
-            (float(measure.apart(q, other).max()), a, b)
+            (float(measure.distance(q, other).max()), a, b)
             for b, other in runs.items()
             if a[0] != b[0]
         ]
     if not pairs:
         return None
     error, a, b = min(pairs)
-    measure.scale_by(runs[a])
+    measure.set_scales(runs[a])
     return Reference(runs[a], error, f"{a[0]} {a[1]:.0e} and {b[0]} {b[1]:.0e}", measure)
 
 
@@ -116,7 +115,7 @@ def singles(
             made = single(model, t_end, method, rtol)
             if made is None:
                 break
-            error = float(truth.measure.apart(truth.numbers, made[0].q).max())
+            error = float(truth.measure.distance(truth.numbers, made[0].q).max())
             found.append(Single(method, rtol, error, made[1]))
             better = [one.cpu_s for one in found if one.error <= max(error, least)]
             if error < least or made[1] > _HOPELESS * min(better):

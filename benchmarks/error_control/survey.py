@@ -68,15 +68,15 @@ def judge(
 ) -> None:
     """Ask a scene for an error and count; print what is not met or not kept."""
     result, seconds = timed(model, t_end, error=asked)
-    known = result.error_estimate
+    known = result.achieved_error
     assert known is not None
     count.asked += 1
     count.runs += len(known.runs)
     count.cpu_s += seconds
-    if not known.met:
-        print(f"{name}: asked {asked:.0e}, not met: {known.why}", flush=True)
+    if not known.is_met:
+        print(f"{name}: asked {asked:.0e}, not met: {known.reason}", flush=True)
         return
-    error = float(truth.measure.apart(truth.numbers, result.q).max())
+    error = float(truth.measure.distance(truth.numbers, result.q).max())
     count.met += 1
     count.kept += error <= BEARABLE * asked
     if error > BEARABLE * asked:

@@ -99,11 +99,11 @@ def outcome(
             again = single(model, t_end, one.method, one.rtol)
             assert again is not None
             spent_by.append(again[1])
-    known = result.error_estimate
+    known = result.achieved_error
     assert known is not None
-    error = float(truth.measure.apart(truth.numbers, result.q).max())
+    error = float(truth.measure.distance(truth.numbers, result.q).max())
     return Outcome(
-        name, asked, known.met, known.estimate, error, truth.error, min(ours),
+        name, asked, known.is_met, known.estimate, error, truth.error, min(ours),
         None if best is None else f"{best.method} {best.rtol:.0e}",
         None if best is None else min(others[best]), None if sure is None else min(others[sure]),
         len(known.runs), f"{known.method} {known.rtol:.1e}",

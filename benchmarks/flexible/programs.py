@@ -150,7 +150,7 @@ class MstmmChain:
             more |= {"basis": "simply-supported", "quadrature": False}
         scene = mstmm.Scene(**Strip.chain(COUNT, modes, **more))
         self.model = mstmm.compile(scene, engine=engine)
-        print(self.model.engine_choice, flush=True)
+        print(self.model.engine_reason, flush=True)
 
     def run(self, times: Any, **method: Any) -> mstmm.Result:
         """To the end, or an error."""

@@ -18,12 +18,13 @@ import numpy as np
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
-sys.path[:0] = [str(HERE), str(HERE.parent), str(ROOT / "tests")]
+sys.path[:0] = [str(HERE), str(HERE.parent), str(ROOT)]
 
 import picture  # noqa: E402
-from flexible import scenes  # noqa: E402
-from flexible import test_motions as motions  # noqa: E402
-from flexible.reference import finite_elements as fe  # noqa: E402
+
+from tests.reference.flexible import finite_elements as fe  # noqa: E402
+from tests.support.scenes import flexible as scenes  # noqa: E402
+from tests.system.flexible import test_motions as motions  # noqa: E402
 
 #: Line -> (basis, keys of the beams).
 LINES: dict[str, dict[str, tuple[str, dict[str, Any]]]] = {

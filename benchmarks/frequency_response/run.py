@@ -45,9 +45,9 @@ def answers(bodies: int) -> tuple[int, dict[str, Callable[[], np.ndarray]]]:
     model = mstmm.compile(chain(bodies), engine="looped")
     linear = model.linearize(np.zeros(model.nq), inputs=["rope[0].hinge.effort"], disturbances=())
     omega = np.linspace(1, 30, max(100, 20_000 // bodies))
-    last = [linear.coordinates[-1]]
+    last = [linear.coordinate_names[-1]]
     work: dict[str, Callable[[], np.ndarray]] = {
-        "mstmm": lambda: linear.frequency_response(omega, None, last).values[:, 0, 0]
+        "mstmm": lambda: linear.frequency_response(omega, None, last).response[:, 0, 0]
     }
     if bodies > DENSE:
         return len(omega), work

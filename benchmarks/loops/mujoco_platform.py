@@ -22,7 +22,7 @@ class MujocoPlatform:
     """The same bodies in the start of a model; all coordinates are zero there."""
 
     def __init__(self, model: mstmm.Model) -> None:
-        self.start, self.layout = model.simulate(0.0), model.layout
+        self.start, self.layout = model.simulate(0.0), model.coordinate_layout
         platform = next(body for body in model.scene.body if body.name == "platform")
         self.heads = [np.array(platform.ends[f"head{k}"].position) for k in range(6)]
         rests = [h.law.rest for h in model.scene.hinge if h.type == "prismatic" and h.law]

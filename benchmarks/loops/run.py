@@ -86,7 +86,7 @@ def evaluations(model: mstmm.Model, count: int) -> Callable[[], np.ndarray]:
 def slides(model: mstmm.Model) -> np.ndarray:
     """Accelerations of the six legs at the start."""
     udot = model.accelerations(*model.initial_state())
-    return np.array([udot[model.layout.hinges[f"slide{k}"].u] for k in range(6)])
+    return np.array([udot[model.coordinate_layout.hinges[f"slide{k}"].u] for k in range(6)])
 
 
 def per_evaluation(

@@ -27,7 +27,7 @@ class Data:
     def __init__(self, model: mstmm.Model) -> None:
         scene = tomllib.loads(SCENE.read_text(encoding="utf-8"))
         self.body = {one["name"]: one for one in scene["body"]}
-        tree = [one for one in scene["hinge"] if one["name"] not in model.loops.cut]
+        tree = [one for one in scene["hinge"] if one["name"] not in model.loops.cut_hinges]
         self.hinge: list[dict[str, Any]] = []
         known = {"ground"}
         while len(self.hinge) < len(tree):
@@ -35,10 +35,12 @@ class Data:
             self.hinge.append(one)
             known.add(_body(one["outboard"]))
         self.order = [_body(one["outboard"]) for one in self.hinge]
-        self.closing = [one for one in scene["hinge"] if one["name"] in model.loops.cut]
+        self.closing = [one for one in scene["hinge"] if one["name"] in model.loops.cut_hinges]
         self.spring = scene["spring"][0]
         q, _ = model.initial_state()
-        self.start = np.array([q[model.layout.hinges[one["name"]].q] for one in self.hinge])
+        self.start = np.array(
+            [q[model.coordinate_layout.hinges[one["name"]].q] for one in self.hinge]
+        )
 
     def point(self, end: str) -> tuple[str, list[float]]:
         """Body and place of an end."""
@@ -58,7 +60,7 @@ def _body(end: str) -> str:
 
 def mstmm_runs(model: mstmm.Model) -> dict[str, Run]:
     """The whole call of `simulate`, loops kept closed step by step."""
-    beta = model.layout.hinges["beta"].q
+    beta = model.coordinate_layout.hinges["beta"].q
 
     def run(tolerance: float) -> float:
         result = model.simulate(

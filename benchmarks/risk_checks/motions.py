@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+import mstmm
 from mstmm.atlas.error_measures import refinement_correction
 from mstmm.atlas.shared_scenes import rod, spinning_top
 from mstmm.runtime.engine.eigenvalues import fastest_eigenvalue
@@ -74,8 +75,8 @@ def pulse_in_angle(rng: Rng) -> Trial:
     times = None if rng.random() < 0.5 else np.linspace(0, 3.0, int(rng.integers(2, 20)))
     method = str(rng.choice(["dop853", "dopri5", "auto"]))
     run, before = tried(one, 3.0, method=method, rtol=rtol, atol=rtol / 100, output_times=times)
-    exact = one.simulate(3.0, rtol=1e-11, atol=1e-13, max_step=min(0.05, width / 10),
-                         output_times=run.t)  # fmt: skip
+    short_steps = mstmm.methods.Method(max_step=min(0.05, width / 10))
+    exact = one.simulate(3.0, short_steps, rtol=1e-11, atol=1e-13, output_times=run.t)
     return judged(width, run, before, off(run, exact) / max(1e-3, 100 * rtol))
 
 

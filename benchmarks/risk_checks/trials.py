@@ -60,12 +60,14 @@ def tried(one: mstmm.Model, t_end: float, **settings: Any) -> tuple[Result, tupl
         one, Settings(t_end, **known), np.asarray(q, float), np.asarray(u, float)
     ).risks
     run = one.simulate(t_end, **settings)
-    return run, names((*seen, *(risk for risk in run.risks if risk.before)))
+    return run, names((*seen, *(risk for risk in run.risks if risk.seen_before_run)))
 
 
 def judged(drawn: float, run: Result, before: tuple[str, ...], error: float) -> Trial:
     """The trial of a run with this error, in parts of what is wrong."""
-    after = names(tuple(risk for risk in run.risks if not risk.before and risk.doubt))
+    after = names(
+        tuple(risk for risk in run.risks if not risk.seen_before_run and risk.invalidates)
+    )
     return Trial(drawn, before, after, error if run.success else math.inf, not run.success)
 
 
@@ -74,6 +76,6 @@ def off(run: Result, exact: Result) -> float:
     if not run.success:
         return math.inf
     measure = Coordinates(exact.model)
-    measure.scale_by(exact.q)
+    measure.set_scales(exact.q)
     _, ours, theirs = np.intersect1d(run.t, exact.t, return_indices=True)
-    return float(measure.apart(exact.q[theirs], run.q[ours]).max(initial=0.0))
+    return float(measure.distance(exact.q[theirs], run.q[ours]).max(initial=0.0))

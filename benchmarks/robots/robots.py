@@ -110,7 +110,7 @@ class Case:
 
     @cached_property
     def layout(self) -> Any:
-        return mstmm.compile(self.imported.scene, engine="looped").layout
+        return mstmm.compile(self.imported.scene, engine="looped").coordinate_layout
 
     def joints(self, peer: mujoco.MjModel) -> list[tuple[Any, int]]:
         """Joints of one freedom: their places among ours, and their numbers in MuJoCo's model."""

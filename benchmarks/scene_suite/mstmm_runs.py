@@ -65,18 +65,18 @@ def surveyed(
     reference = Reference(
         best.error, best.made_by, LOOPED, distance.name, distance.unit, distance.scaling
     )
-    say(f"{case.name}: reference good to {best.error:.1e} m after {budget.spent:.0f} s")
+    say(f"{case.name}: reference good to {best.error:.1e} m after {budget.elapsed:.0f} s")
     curves = [
-        method_curve(name, engine, one, case.t_end, reference.floor, None)
+        method_curve(name, engine, one, case.t_end, reference.smallest_resolved_error, None)
         for name in methods or all_methods()
         if family(name) not in OTHERS
         for engine, one in models.items()
     ]
     survey = Survey(best.run, distance, runs, _quiet)
-    survey.make([one for one in curves if one.method in PROMISING], EARLY)
-    found = survey.make([one for one in curves if one.method not in PROMISING], SETTINGS)
+    survey.run_curves([one for one in curves if one.method in PROMISING], EARLY)
+    found = survey.run_curves([one for one in curves if one.method not in PROMISING], SETTINGS)
     assert best.run.numbers is not None
-    return Own(models, reference, best.run.numbers[-1], found.points, found.left_out)
+    return Own(models, reference, best.run.numbers[-1], found.points, found.skipped)
 
 
 def call(own: Own, case: Case, setting: Setting) -> Callable[[], object]:
@@ -98,7 +98,8 @@ def _warm(model: mstmm.Model, t_end: float) -> None:
     for name in all_methods():
         if family(name) not in OTHERS:
             with suppress(mstmm.MstmmError):
-                model.simulate(t_end, method=name, output_times=[t_end], max_steps=2)
+                two_steps = mstmm.methods.Method(name, max_steps=2)
+                model.simulate(t_end, two_steps, output_times=[t_end])
 
 
 def _quiet(_: str) -> None:

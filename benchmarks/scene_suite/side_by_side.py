@@ -60,7 +60,9 @@ def compared(case: Case, limits: Limits, with_peers: bool, say: Callable[[str], 
         calls |= {setting: run for setting, (_, run) in found.items()}
         say(f"{case.name}: {curve.tool}, {curve.manner}: {len(found)} settings")
     known = {tool: bound_errors(some, reference) for tool, some in points.items()}
-    fronts = {tool: pareto_front(some, reference.floor) for tool, some in known.items()}
+    fronts = {
+        tool: pareto_front(some, reference.smallest_resolved_error) for tool, some in known.items()
+    }
     best = timed(fronts, calls, limits.rounds)
     return {
         "case": case.name, "title": case.title, "t_end_s": case.t_end, "of": case.watched[-1],
@@ -94,7 +96,7 @@ def tried(
             yield setting, (Point(setting, failure="places that are not numbers"), run)
             continue
         yield setting, (Point(setting, error, spent, 1), run)
-        accurate += error < max(_ENOUGH, own.reference.floor)
+        accurate += error < max(_ENOUGH, own.reference.smallest_resolved_error)
         if accurate == 2 or spent > limits.run:
             return
 
@@ -149,6 +151,6 @@ def plain(point: Point) -> dict[str, Any]:
     return {
         "method": point.method, "manner": point.model,
         "value": point.setting.value, "fixed": point.setting.fixed,
-        "error_m": float(f"{point.error:.4g}"), "sure_error_m": float(f"{point.sure_error:.4g}"),
+        "error_m": float(f"{point.error:.4g}"), "sure_error_m": float(f"{point.error_bound:.4g}"),
         "cpu_ms": float(f"{1e3 * point.cpu_s:.4g}"),
     }  # fmt: skip

@@ -202,10 +202,7 @@ def cvode(model: mstmm.Model, case: Case, say: Callable[[str], None]) -> list[Cu
 
 
 def _slackened(
-    tool: str,
-    manner: str,
-    run: Callable[[float, float], Outcome],
-    slack: float,
+    tool: str, manner: str, run: Callable[[float, float], Outcome], slack: float
 ) -> Curve:
     settings = [(t, partial(run, t, slack)) for t in TOLERANCES]
     return Curve(tool, f"{manner}, atol of speeds x {slack:g}", settings)

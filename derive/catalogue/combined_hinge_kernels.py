@@ -41,7 +41,7 @@ def forward_kept(hinge: KernelIR) -> KernelIR:
     return graph.kernel(
         "forward_kept", (*hinge.inputs, *more), outputs,
         _nested_values(outputs, nodes | body_nodes),
-        purpose="motion across the hinge and of the body behind it", sources=hinge.sources,
+        purpose="motion across the hinge and of its outboard body", sources=hinge.sources,
     )  # fmt: skip
 
 
@@ -133,14 +133,14 @@ def _port_length(kernel: KernelIR, name: str) -> int:
 def _nested_values(ports: Sequence[Port], nodes: Mapping[str, Nodes]) -> dict[str, object]:
     """Nodes of ports, nested as their shapes."""
 
-    def nested(port: Port) -> object:
+    def nest_port(port: Port) -> object:
         row = nodes[port.name]
         if len(port.shape) == 1:
             return row
         width = int(port.shape[1])
         return [row[width * i : width * (i + 1)] for i in range(int(port.shape[0]))]
 
-    return {port.name: nested(port) for port in ports if nodes[port.name]}
+    return {port.name: nest_port(port) for port in ports if nodes[port.name]}
 
 
 @cache

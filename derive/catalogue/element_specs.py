@@ -58,7 +58,7 @@ def spec_of(element: Element) -> ElementSpec:
 
 
 def spec_from(element: Element, kernels: tuple[Kernel, ...]) -> ElementSpec:
-    """ElementSpec of an element and its derived kernels."""
+    """Build the specification of an element: lowered kernels and properties of a hinge."""
     hinge = element if isinstance(element, Hinge) else None
     lowered = _lower_kernels(kernels, kind_of(element))
     return ElementSpec(
@@ -78,8 +78,8 @@ def hinge_facts(hinge: Hinge, kernels: Sequence[KernelIR]) -> HingeProperties:
     """Free directions and input keys of a hinge, from its kernel "hinge"."""
     motion = next(kernel for kernel in kernels if kernel.name == "hinge")
     return hinge_properties(
-        motion, hinge.name, hinge.coordinates, speeds_of(hinge), hinge.parameters, hinge.frame,
-        hinge.keys, hinge.allows or hinge.title,
+        motion, hinge.name, hinge.coordinates, speeds_of(hinge), hinge.parameters, hinge.frame_rule,
+        hinge.scene_keys, hinge.motion_text or hinge.title,
     )  # fmt: skip
 
 
@@ -87,12 +87,12 @@ def all_facts(specs: Sequence[ElementSpec]) -> list[HingeProperties]:
     """Properties of the built-in hinges, by increasing number of speeds."""
     facts_by_name = {spec.name: spec.facts for spec in specs if spec.facts is not None}
     for hinge in builtin_hinges():
-        if hinge.runs_as:
+        if hinge.equivalent_builtin:
             facts_by_name[hinge.name] = replace(
-                facts_by_name[hinge.runs_as],
+                facts_by_name[hinge.equivalent_builtin],
                 name=hinge.name,
-                allows=hinge.allows,
-                runs_as=hinge.runs_as,
+                allows=hinge.motion_text,
+                runs_as=hinge.equivalent_builtin,
             )
     return sorted(facts_by_name.values(), key=lambda facts: (len(facts.speeds), facts.name))
 
@@ -122,11 +122,7 @@ def shared_specs() -> list[ElementSpec]:
         plain(name="qr", title="sweep as least squares", kernels=_lower_kernels(qr_kernels())),
         plain(name="screw", title="transport across axial screws", kernels=screws),
         *(
-            plain(
-                name=f"link_{name}",
-                title=title,
-                kernels=_lower_kernels(link_kernels(name)),
-            )
+            plain(name=f"link_{name}", title=title, kernels=_lower_kernels(link_kernels(name)))
             for name, title in link_names().items()
         ),
         *(generic_spec(nu) for nu in range(MAX_SPEEDS + 1)),

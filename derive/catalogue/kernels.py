@@ -32,13 +32,7 @@ from ..equations import force_element as force_kernels
 from ..equations import tangent_position_loads as placed
 from ..equations import user_body as body_kernels
 from ..equations.constrained_directions import complement
-from ..equations.hinge import (
-    HingeMotion,
-    hinge_derivation,
-    hinge_quantities,
-    motion_of,
-    place_of,
-)
+from ..equations.hinge import HingeMotion, hinge_derivation, hinge_pose, hinge_quantities, motion_of
 from ..equations.ldl_elimination import eliminate_factored, recover_factored
 from ..equations.links import axial, rotational
 from ..flexible import (
@@ -150,13 +144,13 @@ def hinge_kernels(hinge: Hinge) -> tuple[Kernel, ...]:
             riccati_sweep.condense(nu, subspace, inputs[:2], hinge.name),
             riccati_sweep.pivot_guards(nu, subspace),
         ),
-        Kernel("recover", riccati_sweep.recover(nu, subspace, inputs[:2], hinge.name)),
+        Kernel("recover", riccati_sweep.back_substitute(nu, subspace, inputs[:2], hinge.name)),
     ]
     if nu:
         kernels.append(
             Kernel("eliminate", eliminate_factored(nu, subspace, inputs[:2], hinge.name))
         )
-    measure = hinge.singular_when(motion.q, motion.p)
+    measure = hinge.singularity_measure(motion.q, motion.p)
     if measure is not None:
         kernels.append(Kernel("singularity", _singularity_derivation(motion, measure)))
     return tuple(kernels)
@@ -179,19 +173,23 @@ def generic_kernels(nu: int) -> tuple[Kernel, ...]:
     return (
         Kernel("forward", riccati_sweep.forward_generic(nu)),
         Kernel("condense", riccati_sweep.condense(nu), riccati_sweep.pivot_guards(nu)),
-        Kernel("recover", riccati_sweep.recover(nu)),
+        Kernel("recover", riccati_sweep.back_substitute(nu)),
         Kernel("effort", riccati_sweep.effort(nu)),
         Kernel("project", riccati_sweep.project(nu)),
         Kernel("factor", multiple_right_hand_sides.factor(nu), riccati_sweep.pivot_guards(nu)),
-        Kernel("push", multiple_right_hand_sides.push(nu)),
-        Kernel("answer", multiple_right_hand_sides.answer(nu)),
+        Kernel("push", multiple_right_hand_sides.column_load(nu)),
+        Kernel("answer", multiple_right_hand_sides.column_acceleration(nu)),
         Kernel("qr_eliminate", qr_sweep.qr_eliminate(nu), qr_sweep.qr_guards(nu)),
         *(Kernel(make.__name__, make(nu)) for make in _TANGENT_STEPS),
         *(Kernel(make.__name__, make(nu)) for make in _TANGENT_SPEED_STEPS if nu),
         Kernel("complement", complement(nu)),
         *(Kernel(make.__name__, make(nu)) for make in loop_closure.OF_SPEEDS if nu),
-        *((Kernel("exerted", riccati_sweep.exerted(nu)),) if nu else ()),
-        *((Kernel("push_on_ground", multiple_right_hand_sides.push_on_ground(nu)),) if nu else ()),
+        *((Kernel("exerted", riccati_sweep.required_load(nu)),) if nu else ()),
+        *(
+            (Kernel("push_on_ground", multiple_right_hand_sides.ground_column_load(nu)),)
+            if nu
+            else ()
+        ),
         *((Kernel("eliminate", eliminate_factored(nu)),) if nu else ()),
         *((Kernel("recover_factored", recover_factored(nu)),) if nu else ()),
     )
@@ -241,12 +239,12 @@ def links() -> Mapping[str, Hinge]:
     hinges = [element for element in builtin_elements() if isinstance(element, Hinge)]
     return {
         hinge.name: hinge for hinge in hinges
-        if _is_axial(hinge) or rotational.turns_about_a_point(hinge)
+        if _is_axial(hinge) or rotational.is_rotational(hinge)
     }  # fmt: skip
 
 
 def _is_axial(hinge: Hinge) -> bool:
-    place = place_of(hinge)
+    place = hinge_pose(hinge)
     return place.nu > 0 and hinge.speeds is None and axial.along_z(place) is not None
 
 
@@ -256,8 +254,8 @@ ROTOR = "_rotor"
 
 def link_names() -> dict[str, str]:
     """Names of all links -> title; a hinge with one speed also has a link with rotor."""
-    titles = {name: f"rigid body behind the {hinge.title}" for name, hinge in links().items()}
-    single = [name for name, hinge in links().items() if place_of(hinge).nu == 1]
+    titles = {name: f"rigid body outboard of the {hinge.title}" for name, hinge in links().items()}
+    single = [name for name, hinge in links().items() if hinge_pose(hinge).nu == 1]
     return titles | {f"{name}{ROTOR}": f"{titles[name]} with a rotor" for name in single}
 
 
@@ -266,17 +264,17 @@ def link_kernels(name: str) -> tuple[Kernel, ...]:
     hinge, rotor, body = links()[name.removesuffix(ROTOR)], name.endswith(ROTOR), RigidBody()
     motion = motion_of(hinge)
     guards = riccati_sweep.pivot_guards(
-        motion.nu, motion.in_arrays(motion.subspace), axial.floor(body)
+        motion.nu, motion.in_arrays(motion.subspace), axial.pivot_threshold(body)
     )
-    if rotational.turns_about_a_point(hinge):
+    if rotational.is_rotational(hinge):
         return (
-            Kernel("turn", rotational.turn(motion)),
+            Kernel("turn", rotational.rotation_derivation(motion)),
             Kernel("forward", rotational.forward(motion, body)),
             Kernel("condense", rotational.condense(motion, body), guards),
             Kernel("recover", rotational.recover(motion)),
         )
     return (
-        Kernel("turn", axial.turn(motion)),
+        Kernel("turn", axial.rotation_derivation(motion)),
         Kernel("forward", axial.forward(motion, body)),
         Kernel("condense", axial.condense(motion, body, rotor), guards),
         Kernel("recover", axial.recover(motion, rotor)),
@@ -285,7 +283,7 @@ def link_kernels(name: str) -> tuple[Kernel, ...]:
 
 def modal_kernels() -> tuple[Kernel, ...]:
     """Kernels of flexible bodies (n modes, run-time size): residual, sections, condensation."""
-    turns = section.turn_guards()
+    turns = section.rotation_guards()
     return (
         Kernel("residual", modal_residual.residual()),
         Kernel("momentum", modal_residual.momentum()),
@@ -294,7 +292,7 @@ def modal_kernels() -> tuple[Kernel, ...]:
         Kernel("outward", section.outward(), turns),
         Kernel("inward", section.inward(), turns),
         Kernel("subspace", section.subspace()),
-        Kernel("imposed", section.imposed()),
+        Kernel("imposed", section.prescribed_bias()),
         *(
             Kernel(step.__name__, step())
             for step in (*modal_sweep.STEPS, *modal_constraint_rows.STEPS)

@@ -71,7 +71,7 @@ def builtin_elements() -> list[Element]:
 
     Every call returns the same instances.  Raises ElementError for a name used twice.
     """
-    return [e for e in _builtin_elements() if not (isinstance(e, Hinge) and e.runs_as)]
+    return [e for e in _builtin_elements() if not (isinstance(e, Hinge) and e.equivalent_builtin)]
 
 
 def builtin_hinges() -> list[Hinge]:

@@ -72,20 +72,20 @@ def _spatial_premises(free: tuple[str, ...]) -> Parts:
     axes, next_axes = sp.MatrixSymbol("A", 3, 3), sp.MatrixSymbol("A_n", 3, 3)
     offset, next_offset = vector("d", 3), vector("d_n", 3)
     eta_v, eta_w = vector("eta_v", 3), vector("eta_w", 3)
-    rdd_i, wd_i, m_i, q_i = SPATIAL.at("I")
-    rdd_o, wd_o, m_o, q_o = SPATIAL.at("O")
-    _, _, m_n, q_n = SPATIAL.at("N")
+    rdd_i, wd_i, m_i, q_i = SPATIAL.end_blocks("I")
+    rdd_o, wd_o, m_o, q_o = SPATIAL.end_blocks("O")
+    _, _, m_n, q_n = SPATIAL.end_blocks("N")
     carried_acceleration = rdd_i - Tilde(offset) * wd_i + eta_v
     transmitted_moment = m_i - Tilde(offset) * q_i
     next_moment = m_n - Tilde(next_offset) * q_n
     premises = (
         Equation(
-            "acceleration behind the hinge",
+            "acceleration outboard of the hinge",
             rdd_o,
             _combine_directions(axes, carried_acceleration, translations, alpha, 0),
         ),
         Equation(
-            "angular acceleration behind the hinge",
+            "angular acceleration outboard of the hinge",
             wd_o,
             _combine_directions(axes, wd_i + eta_w, rotations, alpha, len(translations)),
         ),
@@ -116,18 +116,18 @@ def _planar_premises(free: tuple[str, ...]) -> Parts:
     axes, next_axes = sp.MatrixSymbol("A", 2, 2), sp.MatrixSymbol("A_n", 2, 2)
     offset, next_offset = vector("d", 2), vector("d_n", 2)
     eta_v, eta_w = vector("eta_v", 2), sp.MatrixSymbol("eta_w", 1, 1)
-    rdd_i, wd_i, m_i, q_i = PLANAR.at("I")
-    rdd_o, wd_o, m_o, q_o = PLANAR.at("O")
-    _, _, m_n, q_n = PLANAR.at("N")
+    rdd_i, wd_i, m_i, q_i = PLANAR.end_blocks("I")
+    rdd_o, wd_o, m_o, q_o = PLANAR.end_blocks("O")
+    _, _, m_n, q_n = PLANAR.end_blocks("N")
     carried_acceleration = rdd_i + wd_i[0, 0] * Perp(offset) + eta_v
     outboard_rotation = Matrix([[alpha[len(translations), 0]]]) if rotations else wd_i + eta_w
     premises = (
         Equation(
-            "acceleration behind the hinge",
+            "acceleration outboard of the hinge",
             rdd_o,
             _combine_directions(axes, carried_acceleration, translations, alpha, 0),
         ),
-        Equation("angular acceleration behind the hinge", wd_o, outboard_rotation),
+        Equation("angular acceleration outboard of the hinge", wd_o, outboard_rotation),
         Equation("moment transmitted", m_o, m_i - Perp(offset).T * q_i, "(5.63)"),
         Equation("force transmitted", q_o, q_i, "(5.65)"),
     )

@@ -13,8 +13,8 @@ NEXT_EFFORT = vector("tau_n", 3)
 
 def statement() -> HingeStatement:
     """Premises (5.39) to (5.42) and the next ball's condition (5.43)."""
-    rdd_i, _, m_i, q_i = SPATIAL.at("I")
-    rdd_o, wd_o, m_o, q_o = SPATIAL.at("O")
+    rdd_i, _, m_i, q_i = SPATIAL.end_blocks("I")
+    rdd_o, wd_o, m_o, q_o = SPATIAL.end_blocks("O")
     return HingeStatement(
         element="classical_ball",
         title="ball hinge, classical transfer matrix",
@@ -28,14 +28,14 @@ def statement() -> HingeStatement:
             Equation("force transmitted", q_o, q_i, "(5.41)"),
         ),
         conditions=(
-            Equation("moment of the next ball", SPATIAL.at("N")[2], NEXT_EFFORT, "(5.43)"),
+            Equation("moment of the next ball", SPATIAL.end_blocks("N")[2], NEXT_EFFORT, "(5.43)"),
         ),
         source="(5.39) to (5.49)",
         equation="(5.49)",
         notes=(
             "With u_kl the blocks of U: "
             "omegadot_O = -u_32^-1 (u_31 rdd_I + u_33 m_I + u_34 q_I + u_35 - tau_n).",
-            "Behind the last body the free tip takes the place of the next ball (tau_n = 0).",
+            "Outboard of the last body the free tip replaces the next ball (tau_n = 0).",
         ),
     )
 

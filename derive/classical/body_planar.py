@@ -32,8 +32,8 @@ OUTPUTS = (
 
 def premises() -> tuple[Equation, ...]:
     """Geometry of the body, Newton's law for C and the moment about I, in the plane."""
-    rdd_i, wd_i, m_i, q_i = PLANAR.at("I")
-    rdd_o, wd_o, m_o, q_o = PLANAR.at("O")
+    rdd_i, wd_i, m_i, q_i = PLANAR.end_blocks("I")
+    rdd_o, wd_o, m_o, q_o = PLANAR.end_blocks("O")
     mass, speed, alpha = MASS[0, 0], OMEGA[0, 0], wd_i[0, 0]
     geometry = rdd_i + alpha * Perp(OUTPUT) - speed**2 * OUTPUT
     linear = mass * (rdd_i + alpha * Perp(CENTER) - speed**2 * CENTER)

@@ -46,8 +46,8 @@ def bias_definitions() -> tuple[Equation, ...]:
 
 def premises() -> tuple[Equation, ...]:
     """Geometry of the body, Newton's law for C and Euler's law about I."""
-    rdd_i, wd_i, m_i, q_i = SPATIAL.at("I")
-    rdd_o, wd_o, m_o, q_o = SPATIAL.at("O")
+    rdd_i, wd_i, m_i, q_i = SPATIAL.end_blocks("I")
+    rdd_o, wd_o, m_o, q_o = SPATIAL.end_blocks("O")
     mass = MASS[0, 0]
     rdd_c = rdd_i - Tilde(CENTER) * wd_i + B_CENTER
     geometry = rdd_i - Tilde(OUTPUT) * wd_i + B_OUTPUT

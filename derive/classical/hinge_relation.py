@@ -86,7 +86,9 @@ def elimination_matrices(statement: HingeStatement) -> tuple[Matrix, Matrix]:
     """E and G of z_O = E z_I + G alpha (n x n and n x freedoms), solved from the premises."""
     state = statement.state
     freedoms = int(statement.free.rows)
-    rows = solve_linear(statement.premises, state.at("O"), (*state.at("I"), statement.free))
+    rows = solve_linear(
+        statement.premises, state.end_blocks("O"), (*state.end_blocks("I"), statement.free)
+    )
     state_columns = state.length - 1
     constant = rows[:, state_columns + freedoms :]
     carried_state = append_affine_row(Matrix(rows[:, :state_columns].row_join(constant)))
@@ -96,7 +98,7 @@ def elimination_matrices(statement: HingeStatement) -> tuple[Matrix, Matrix]:
 
 def condition_rows(statement: HingeStatement) -> tuple[Matrix, Matrix]:
     """L and t of the next hinge's condition L (m, q)_N = t (freedoms x efforts, freedoms x 1)."""
-    efforts = statement.state.at("N")[2:]
+    efforts = statement.state.end_blocks("N")[2:]
     residuals = sp.Matrix.vstack(*(residual(equation) for equation in statement.conditions))
     columns = sp.Matrix([symbol[i, 0] for symbol in efforts for i in range(int(symbol.rows))])
     rows = residuals.jacobian(columns)

@@ -15,8 +15,8 @@ NEXT_EFFORT = sp.MatrixSymbol("tau_n", 1, 1)
 
 def statement() -> HingeStatement:
     """Premises (5.28) to (5.31) and the next pin's condition (5.32)."""
-    rdd_i, _, m_i, q_i = PLANAR.at("I")
-    rdd_o, wd_o, m_o, q_o = PLANAR.at("O")
+    rdd_i, _, m_i, q_i = PLANAR.end_blocks("I")
+    rdd_o, wd_o, m_o, q_o = PLANAR.end_blocks("O")
     return HingeStatement(
         element="classical_pin_planar",
         title="planar pin, classical transfer matrix",
@@ -29,13 +29,15 @@ def statement() -> HingeStatement:
             Equation("moment transmitted", m_o, m_i, "(5.29), (5.31)", "0 for a smooth pin"),
             Equation("force transmitted", q_o, q_i, "(5.30)"),
         ),
-        conditions=(Equation("moment of the next pin", PLANAR.at("N")[2], NEXT_EFFORT, "(5.32)"),),
+        conditions=(
+            Equation("moment of the next pin", PLANAR.end_blocks("N")[2], NEXT_EFFORT, "(5.32)"),
+        ),
         source="(5.28) to (5.38)",
         equation="(5.38)",
         notes=(
             "With u_kl the blocks of U: "
             "thetadd_O = -(u_31 rdd_I + u_33 m_I + u_34 q_I + u_35 - tau_n) / u_32.",
-            "Behind the last body the free tip takes the place of the next pin (tau_n = 0).",
+            "Outboard of the last body the free tip replaces the next pin (tau_n = 0).",
         ),
     )
 

@@ -19,9 +19,9 @@ NEXT_EFFORT = sp.MatrixSymbol("tau_n", 1, 1)
 
 def statement() -> HingeStatement:
     """Premises (5.50) to (5.54) and the next pin's condition (5.55)."""
-    rdd_i, wd_i, m_i, q_i = SPATIAL.at("I")
-    rdd_o, wd_o, m_o, q_o = SPATIAL.at("O")
-    about_next = NEXT_AXIS.T * SPATIAL.at("N")[2]
+    rdd_i, wd_i, m_i, q_i = SPATIAL.end_blocks("I")
+    rdd_o, wd_o, m_o, q_o = SPATIAL.end_blocks("O")
+    about_next = NEXT_AXIS.T * SPATIAL.end_blocks("N")[2]
     bias = tilde(OMEGA) * explicit(AXIS) * SPEED[0, 0]
     return HingeStatement(
         element="classical_pin_spatial",
@@ -47,13 +47,13 @@ def statement() -> HingeStatement:
         source="(5.50) to (5.61)",
         equation="(5.61)",
         bias=(
-            Equation("bias", BIAS, bias, "", "rate of the axis in the turning inboard body"),
+            Equation("bias", BIAS, bias, "", "rate of the axis in the rotating inboard body"),
         ),
         notes=(
             "alpha is the second derivative of the pin angle; with u_kl the blocks of U it is "
             "-(a_n . (u_31 rdd_I + u_32 (omegadot_I + eta) + u_33 m_I + u_34 q_I + u_35) - tau_n) "
             "/ (a_n . u_32 a).",
-            "Behind the last body any axis serves as the next one, e.g. the own (tau_n = 0).",
+            "Outboard of the last body any axis can be the next one, e.g. its own (tau_n = 0).",
             "Pins at right angles on a body with matching principal axes have a vanishing pivot.",
         ),
     )  # fmt: skip

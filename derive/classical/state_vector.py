@@ -37,7 +37,7 @@ class StateVector:
         """Number of acceleration entries; they come first, followed by as many forces."""
         return self.sizes[0] + self.sizes[1]
 
-    def at(self, end: str) -> tuple[sp.MatrixSymbol, ...]:
+    def end_blocks(self, end: str) -> tuple[sp.MatrixSymbol, ...]:
         """Blocks at the end called `end`, e.g. rdd_I, omegadot_I, m_I, q_I."""
         blocks = zip(self.names, self.sizes, strict=True)
         return tuple(vector(f"{name}_{end}", size) for name, size in blocks)
@@ -58,7 +58,7 @@ PLANAR = StateVector(
 
 def transfer_matrix(premises: Sequence[Equation], state: StateVector) -> Matrix:
     """U with z_O = U z_I, solved from premises linear in the blocks at I and O."""
-    rows = solve_linear(premises, state.at("O"), state.at("I"))
+    rows = solve_linear(premises, state.end_blocks("O"), state.end_blocks("I"))
     return append_affine_row(rows)
 
 

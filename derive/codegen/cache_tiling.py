@@ -14,7 +14,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..schedule.differentiated_passes import D
-from ..schedule.pass_steps import ROOT_TO_TIPS, TIPS_TO_ROOT, Pass, Run, RunPass, Step, Sweep, inner
+from ..schedule.pass_steps import (
+    ROOT_TO_TIPS,
+    TIPS_TO_ROOT,
+    Pass,
+    Run,
+    RunPass,
+    Step,
+    Sweep,
+    all_steps,
+)
 from ..schedule.slot_definitions import ROLES
 from .schedule_conditions import condition_text
 
@@ -98,7 +107,7 @@ def _can_chain(run: Run) -> bool:
         and not any(
             _uses_other_bodies(step, _KNOWN_OWNERS)
             for top in sweep_pass.steps
-            for step in inner(top)
+            for step in all_steps(top)
         )
     )
 
@@ -171,7 +180,7 @@ def _is_local_run(run: Run) -> bool:
         or sweep_pass.order == TIPS_TO_ROOT
     ):
         return False
-    steps = [part for step in sweep_pass.steps for part in inner(step)]
+    steps = [part for step in sweep_pass.steps for part in all_steps(step)]
     return not any(_uses_other_bodies(step) for step in steps) and not sweep_pass.given
 
 

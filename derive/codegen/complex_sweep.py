@@ -15,7 +15,7 @@ from mstmm.abi.element_library import REAL
 from mstmm.ir import KernelIR
 from mstmm.ir.element_spec import ElementSpec
 
-from ..schedule.pass_steps import Call, Pass, inner
+from ..schedule.pass_steps import Call, Pass, all_steps
 from ..schedule.tangent_sweep import (
     TANGENT_ANSWERED,
     TANGENT_CARRIED,
@@ -58,7 +58,7 @@ _ADDITIONS = re.compile(r"^( *)(\S.*) ([+-])= (.*);$", re.MULTILINE)
 def _called_kernels(specs: Specs) -> dict[str, Callee]:
     """Kernels that the passes call, by "element.kernel"."""
     all_callees = collect_callees(specs)
-    steps = (part for sweep_pass in PASSES for step in sweep_pass.steps for part in inner(step))
+    steps = (part for sweep_pass in PASSES for step in sweep_pass.steps for part in all_steps(step))
     names = (step.kernel.replace("{free}", "") for step in steps if isinstance(step, Call))
     return {name: all_callees[name] for name in sorted(set(names))}
 

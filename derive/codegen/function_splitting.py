@@ -27,8 +27,8 @@ _VALUES_NAME, _TRUTHS_NAME = "kept", "truths"
 class CrossingValues:
     """Array indices of the values that one part computes (0: before all parts) and others read."""
 
-    made: Mapping[int, int]
-    places: Mapping[int, int]
+    defining_parts: Mapping[int, int]
+    indices: Mapping[int, int]
     width: int
 
 
@@ -72,7 +72,7 @@ def statement_text(text: StraightText, statement: Line, guards: Guards) -> list[
         return text.assign(statement)
     if isinstance(statement, Store):
         return [text.store(statement)]
-    return guards.judged(statement)
+    return guards.emit_guard(statement)
 
 
 class FunctionParts:
@@ -101,7 +101,7 @@ class FunctionParts:
         all_numbers = {*head, *(s.number for s in statements if isinstance(s, Assign))}
         self._values = find_crossing(head, parts, final_reads, all_numbers - text.truths)
         self._truths = find_crossing(head, parts, final_reads, all_numbers & text.truths)
-        self._in_the_end = [n for n in final_reads if self._values.made[n]]
+        self._final_reads = [n for n in final_reads if self._values.defining_parts[n]]
         self.functions = "\n".join(self._function(k, part) for k, part in enumerate(parts, 1))
 
     def calls(self) -> list[str]:
@@ -113,13 +113,13 @@ class FunctionParts:
             f"{dialect.truth} {_TRUTHS_NAME}[{widths[1]}];",
             *self._store_lines(self._head),
             *(f"{self._part_name(k)}({arguments});" for k in range(1, self._count + 1)),
-            *self._load_lines(self._in_the_end),
+            *self._load_lines(self._final_reads),
         ]
 
     def _arguments(self) -> list[str]:
         kernel = self._text.kernel
         ports = [port_array_name(port.name) for port in (*kernel.inputs, *kernel.outputs)]
-        return [*ports, _VALUES_NAME, _TRUTHS_NAME, *([GUARDS_NAME] * self._guards.counted)]
+        return [*ports, _VALUES_NAME, _TRUTHS_NAME, *([GUARDS_NAME] * self._guards.counts_guards)]
 
     def _part_name(self, k: int) -> str:
         return f"{self._name}_part{k}"
@@ -131,7 +131,9 @@ class FunctionParts:
         for statement in part:
             if not (isinstance(statement, Guard) and self._guards.in_lanes):
                 foreign_numbers = {
-                    n: None for n in temporaries_read(statement) if self._values.made[n] != k
+                    n: None
+                    for n in temporaries_read(statement)
+                    if self._values.defining_parts[n] != k
                 }
                 lines += self._load_lines(n for n in foreign_numbers if n not in loaded)
                 loaded.update(foreign_numbers)
@@ -141,7 +143,7 @@ class FunctionParts:
         parameters = [
             *parameter_list(text.kernel, dialect), f"{dialect.real} *restrict {_VALUES_NAME}",
             f"{dialect.truth} *restrict {_TRUTHS_NAME}",
-            *([f"int *restrict {GUARDS_NAME}"] if self._guards.counted else []),
+            *([f"int *restrict {GUARDS_NAME}"] if self._guards.counts_guards else []),
         ]  # fmt: skip
         body, parameter_text = (
             "\n".join(f"    {line}" for line in lines),
@@ -154,22 +156,22 @@ class FunctionParts:
         """C lines that store the temporaries that other parts read."""
         lines = []
         for number in numbers:
-            if number in self._values.places:
-                lines.append(f"{_VALUES_NAME}[{self._values.places[number]}] = t{number};")
-            if number in self._truths.places:
-                lines.append(f"{_TRUTHS_NAME}[{self._truths.places[number]}] = m{number};")
+            if number in self._values.indices:
+                lines.append(f"{_VALUES_NAME}[{self._values.indices[number]}] = t{number};")
+            if number in self._truths.indices:
+                lines.append(f"{_TRUTHS_NAME}[{self._truths.indices[number]}] = m{number};")
         return lines
 
     def _load_lines(self, numbers: Iterable[int]) -> list[str]:
         """C lines that load temporaries of other parts, under the same names."""
         text, lines = self._text, []
         for number in numbers:
-            if number in self._values.places:
-                index = self._values.places[number]
+            if number in self._values.indices:
+                index = self._values.indices[number]
                 lines.append(f"const {text.dialect.real} t{number} = {_VALUES_NAME}[{index}];")
             else:
-                index = self._truths.places[number]
+                index = self._truths.indices[number]
                 lines.append(f"const {text.dialect.truth} m{number} = {_TRUTHS_NAME}[{index}];")
                 lines.append(f"(void)m{number};")  # possibly read only as a number
-                lines += text.counted(number)
+                lines += text.truth_to_number(number)
         return lines

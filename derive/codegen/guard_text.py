@@ -19,20 +19,20 @@ class Guards:
     """The guards of one function's text, in their order."""
 
     def __init__(self, text: StraightText) -> None:
-        self._text, self._found = text, list[tuple[str, int]]()
+        self._text, self._conditions = text, list[tuple[str, int]]()
         self.in_lanes = text.dialect.vector
         has_guards = any(isinstance(s, Guard) for s in text.kernel.statements)
         #: Whether GUARDS counts them during evaluation.
-        self.counted = has_guards and not self.in_lanes
+        self.counts_guards = has_guards and not self.in_lanes
 
-    def begun(self) -> list[str]:
+    def prologue(self) -> list[str]:
         """Lines before the first guard."""
-        return [f"int {GUARDS_NAME}[2] = {{1, 0}};"] if self.counted else []
+        return [f"int {GUARDS_NAME}[2] = {{1, 0}};"] if self.counts_guards else []
 
-    def judged(self, guard: Guard) -> list[str]:
+    def emit_guard(self, guard: Guard) -> list[str]:
         """Lines of one guard; the count is updated at the next different code."""
-        truth, earlier = self._text.truth(guard.condition), self._found[-1:]
-        self._found.append((truth, guard.code))
+        truth, earlier = self._text.truth(guard.condition), self._conditions[-1:]
+        self._conditions.append((truth, guard.code))
         if self.in_lanes:
             return []
         is_new_code = any(code != guard.code for _, code in earlier)
@@ -44,9 +44,9 @@ class Guards:
         """Lines after the last guard, which return the function's result."""
         if self.in_lanes:
             return self._lane_lines()
-        if not self._found:
+        if not self._conditions:
             return ["return 0;"]
-        guard_codes = [code for _, code in self._found]
+        guard_codes = [code for _, code in self._conditions]
         codes = [code for i, code in enumerate(guard_codes) if not i or guard_codes[i - 1] != code]
         code_list = ", ".join(map(str, [*codes, 0]))
         return [
@@ -56,9 +56,9 @@ class Guards:
 
     def _lane_lines(self) -> list[str]:
         lines = ["for (int i = 0; i < MSTMM_LANES; i++) codes[i] = 0;"]
-        if not self._found:
+        if not self._conditions:
             return [*lines, "return 0;"]
-        every = " & ".join(truth for truth, _ in self._found)
+        every = " & ".join(truth for truth, _ in self._conditions)
         lines.append(f"if (MSTMM_LIKELY(lanes_every({every}))) return 0;")
-        lines += [f"lanes_fail(codes, {truth}, {code});" for truth, code in self._found]
+        lines += [f"lanes_fail(codes, {truth}, {code});" for truth, code in self._conditions]
         return [*lines, "return 1;"]

@@ -90,12 +90,12 @@ GENERIC_KERNELS = (
 class Callee:
     """A kernel as called from C: `name` after "mstmm_", `kernel` with the widest ports.
 
-    `by`: "name" for a function, "speeds" for a table by numbers of speeds, "pointer".
+    `call_kind`: "name" for a function, "speeds" for a table by numbers of speeds, "pointer".
     """
 
     name: str
     kernel: KernelIR
-    by: str
+    call_kind: str
     function: str = ""
 
     @property
@@ -165,7 +165,7 @@ def dispatch_tables(specs: Specs, wanted: Collection[str] | None = None) -> str:
     """C tables of kernels by number of speeds, for all callees or those named in `wanted`."""
     lines = []
     for callee in collect_callees(specs).values():
-        if callee.by != "speeds" or (wanted is not None and callee.name not in wanted):
+        if callee.call_kind != "speeds" or (wanted is not None and callee.name not in wanted):
             continue
         kernel = callee.kernel.name
         names = [
@@ -196,14 +196,14 @@ def call_text(callee: Callee, plain: Collection[str] = ()) -> str:
     ]
     struct = f"struct {name} {{\n" + "\n".join(members) + "\n};\n"
     argument_text = _wrap_arguments(argument_names, "        ")
-    if callee.by == "name":
+    if callee.call_kind == "name":
         body = f"    return {callee.function}(\n{argument_text});\n"
         return (
             f"{struct}static inline int {name}_by(struct {name} to)\n{{\n{body}}}\n"
             f"#define {name}(...) {name}_by((struct {name}){{__VA_ARGS__}})\n"
         )
     typedef = f"typedef int {name}_kernel(\n{_wrap_arguments(types, '    ')});\n"
-    if callee.by == "speeds":
+    if callee.call_kind == "speeds":
         dispatch_parameter, target = "int speeds", f"{name}_table[speeds]"
         table_declaration = f"extern {name}_kernel *const {name}_table[];\n"
     else:
@@ -213,7 +213,7 @@ def call_text(callee: Callee, plain: Collection[str] = ()) -> str:
             "",
         )
     body = f"    return {target}(\n{argument_text});\n"
-    dispatch_argument = dispatch_parameter.split()[-1] if callee.by == "speeds" else "kernel"
+    dispatch_argument = dispatch_parameter.split()[-1] if callee.call_kind == "speeds" else "kernel"
     arrays = _array_function(name, callee) if name.startswith("mstmm_hinge_hinge") else ""
     return (
         f"{struct}{typedef}{table_declaration}"

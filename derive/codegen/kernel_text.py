@@ -80,13 +80,10 @@ class KernelText:
     """
 
     def __init__(
-        self,
-        kernel: KernelIR,
-        alike: Sequence[tuple[str, int]] = (),
-        plain: Collection[str] = (),
+        self, kernel: KernelIR, alike: Sequence[tuple[str, int]] = (), plain: Collection[str] = ()
     ) -> None:
         self.kernel = kernel
-        self.alike = VectorLoops(kernel, alike) if alike else None
+        self.vector_loops = VectorLoops(kernel, alike) if alike else None
         self.names = parameter_names(kernel)
         self.ports = {port.name: port for port in (*kernel.inputs, *kernel.outputs)}
         self._truths: set[int] = set()
@@ -95,8 +92,8 @@ class KernelText:
 
     def statements(self) -> list[dict[str, Any]]:
         """One dictionary per statement; its `kind` is assign, sum, store, guard, solve or alike."""
-        if self.alike is not None:
-            return self._loops(self.alike)
+        if self.vector_loops is not None:
+            return self._loops(self.vector_loops)
         return [self._statement(statement) for statement in self.kernel.statements]
 
     def _loops(self, alike: VectorLoops) -> list[dict[str, Any]]:
@@ -104,17 +101,17 @@ class KernelText:
         views: list[dict[str, Any]] = []
         numbers: set[int] = set()
 
-        def shared(operands: Sequence[Operand]) -> None:
-            for assign in alike.needed(operands):
+        def add_shared(operands: Sequence[Operand]) -> None:
+            for assign in alike.required_assignments(operands):
                 if assign.number not in numbers:
                     numbers.add(assign.number)
                     views.append(self._statement(assign))
 
         for loop in alike.loops:
-            shared([Temporary(number) for number in loop.shared])
+            add_shared([Temporary(number) for number in loop.shared_temporaries])
             views.append({"kind": "alike", "lines": self._loop(loop)})
-        for store in alike.others:
-            shared([store.value])
+        for store in alike.other_stores:
+            add_shared([store.value])
             views.append(self._statement(store))
         return views
 
@@ -130,7 +127,7 @@ class KernelText:
             lines.append(f"    const int next = k < {last_index};")
         elif loop.count % 2 == 1:
             lines = [f"for (int k = 0; k < {last_index}; k += k < {last_index - 2} ? 2 : 1) {{"]
-        subtracted = loop.taken_off
+        subtracted = loop.subtracted_values
         for value in loop.values:
             if value.number not in subtracted:
                 lines.append(
@@ -157,9 +154,9 @@ class KernelText:
 
     def _pair(self, value: LaneValue, odd: bool) -> str:
         """C expression of a value for two neighbouring entries."""
-        if value.place is not None:
-            port = self.ports[value.place.port]
-            index = tuple(int(entry) for entry in value.place.index)
+        if value.entry is not None:
+            port = self.ports[value.entry.port]
+            index = tuple(int(entry) for entry in value.entry.index)
             pointer, stride = self._lane_pointer(port, index, value.axis)
             if stride == 1 and not odd:
                 return f"mstmm_beside({pointer})"
@@ -227,7 +224,7 @@ class KernelText:
             self._truths.add(assign.number)
         else:
             self._truths.discard(assign.number)
-        if self._complex and not self._all_plain(assign.args):
+        if self._complex and not self._are_all_plain(assign.args):
             return self._complex_assign(assign)
         self._plain_numbers.add(assign.number)
         operand_texts = [self.operand(a) for a in assign.args]
@@ -240,7 +237,7 @@ class KernelText:
 
     # --- complex numbers ------------------------------------------------------------------------
 
-    def _all_plain(self, operands: Sequence[Operand]) -> bool:
+    def _are_all_plain(self, operands: Sequence[Operand]) -> bool:
         return all(
             o.number in self._plain_numbers if isinstance(o, Temporary)
             else not isinstance(o, Element) or o.port in self._plain_ports
@@ -250,8 +247,8 @@ class KernelText:
     def _complex_assign(self, assign: Assign) -> dict[str, Any]:
         """Operation on complex numbers, or on a complex and a real one, as a function call."""
         self._plain_numbers.discard(assign.number)
-        if assign.op == "mul" and any(self._all_plain([a]) for a in assign.args):
-            args = sorted(assign.args, key=lambda a: not self._all_plain([a]))
+        if assign.op == "mul" and any(self._are_all_plain([a]) for a in assign.args):
+            args = sorted(assign.args, key=lambda a: not self._are_all_plain([a]))
             operand_texts = [self.operand(a) for a in args]
             call = "mstmm_complex_scaled({}, {})"
         else:
@@ -265,7 +262,7 @@ class KernelText:
     def _array_operand(self, operand: Operand) -> str:
         """C text of an operand in an array's own type."""
         text = self.operand(operand)
-        is_real = self._complex and self._all_plain([operand])
+        is_real = self._complex and self._are_all_plain([operand])
         return f"mstmm_complex_plain({text})" if is_real else text
 
     def _solve(self, solve: Solve) -> dict[str, Any]:
@@ -287,8 +284,8 @@ class KernelText:
 
     def operand(self, operand: Operand) -> str:
         """C text of an operand: a literal, an entry of an array or a temporary."""
-        if self.alike is not None:
-            operand = self.alike.read(operand)
+        if self.vector_loops is not None:
+            operand = self.vector_loops.read(operand)
         if isinstance(operand, Constant):
             return literal_text(operand.text)
         if isinstance(operand, Temporary):

@@ -37,7 +37,7 @@ PLANAR_VARIABLES: dict[str, tuple[str, tuple[str, ...]]] = {
 }  # fmt: skip
 
 
-def planar_place(slot: str) -> str | None:
+def planar_slot_text(slot: str) -> str | None:
     """C expression of a slot of a planar body; None if it has none."""
     owner, _, name = slot.partition(".")
     if slot in _RECORD_SLOTS:

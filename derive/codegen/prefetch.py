@@ -16,7 +16,7 @@ from .slot_storage import (
     TANGENT_SLOTS,
     VARIABLES,
     reads_variable,
-    slot_place,
+    slot_expression,
     slot_size,
 )
 from .step_text import is_fused_only
@@ -45,11 +45,11 @@ _MAX_GAP = 8
 
 
 @dataclass(frozen=True)
-class _Stretch:
+class _MemoryRange:
     """Contiguous numbers, `begin` to `end` for a hinge of one speed, and as C expressions."""
 
     variable: str
-    begin: int
+    start: int
     end: int
     first: str
     last: str
@@ -66,7 +66,7 @@ def prefetch_function(name: str, passes: Iterable[Pass]) -> str:
         if sweep_pass.subject == "body"
         for slot in _slots_of_pass(sweep_pass)
     }
-    stretches = _merge_stretches(stretch for slot in slots if (stretch := _stretch_of_slot(slot)))
+    stretches = _merge_ranges(stretch for slot in slots if (stretch := _range_of_slot(slot)))
     if not stretches:
         return ""
     lines = [f"    mstmm_fetch({span.first}, {span.last});" for span in stretches]
@@ -111,12 +111,12 @@ def _slots_of_step(step: Step) -> Iterator[str]:
         yield from (str(value) for name, value in vars(step).items() if name in _SLOT_ATTRIBUTES)
 
 
-def _stretch_of_slot(slot: str) -> _Stretch | None:
+def _range_of_slot(slot: str) -> _MemoryRange | None:
     """Memory range of a slot of the body itself; None for other slots."""
     name = slot.partition("[")[0]
     slot_name = name.removeprefix(D)
     begin = _OFFSETS.get(SHARED_SLOTS.get(slot_name, slot_name))
-    slot_location = slot_place(name)
+    slot_location = slot_expression(name)
     if begin is None or slot_location is None or slot_name not in SLOTS:
         return None
     numbers = prod(
@@ -128,20 +128,20 @@ def _stretch_of_slot(slot: str) -> _Stretch | None:
         if reads_variable(slot_location.text, variable)
     )
     end_text = f"{slot_location.text} + {slot_size(slot_name).replace('free', 'nu')}"
-    return _Stretch(
+    return _MemoryRange(
         next(variables_read, "body"), begin, begin + numbers, slot_location.text, end_text
     )
 
 
-def _merge_stretches(stretches: Iterable[_Stretch]) -> list[_Stretch]:
+def _merge_ranges(stretches: Iterable[_MemoryRange]) -> list[_MemoryRange]:
     """Merge stretches separated by small gaps."""
-    merged: list[_Stretch] = []
+    merged: list[_MemoryRange] = []
     for stretch in sorted(stretches, key=astuple):
         previous = merged[-1] if merged else None
         if (
             previous is None
             or previous.variable != stretch.variable
-            or stretch.begin > previous.end + _MAX_GAP
+            or stretch.start > previous.end + _MAX_GAP
         ):
             merged.append(stretch)
         elif stretch.end > previous.end:

@@ -74,9 +74,9 @@ class _ScalarText(StraightText):
         super().__init__(kernel, SCALAR_DIALECT)
         self._suffix = suffix
 
-    def word(self, operand: Operand) -> str:
+    def operand_text(self, operand: Operand) -> str:
         if not isinstance(operand, Constant) or operand.text == "pi":
-            return super().word(operand)
+            return super().operand_text(operand)
         value = Fraction(operand.text)
         with localcontext(prec=_DIGITS):
             digits = f"{Decimal(value.numerator) / Decimal(value.denominator):.{_DIGITS - 1}e}"

@@ -145,10 +145,10 @@ def function_text(kernel: KernelIR, name: str, dialect: Dialect) -> str:
     text = StraightText(kernel, dialect)
     schedule = gather(kernel.statements)
     is_short = not dialect.vector and kernel.flops() <= _MAX_INTERLEAVED_FLOPS
-    statements = interleave(schedule.rest) if is_short else thrifty(schedule.rest)
+    statements = interleave(schedule.remaining) if is_short else thrifty(schedule.remaining)
     guards = Guards(text)
     parts = (
-        FunctionParts(text, name, schedule.made(), statements, guards)
+        FunctionParts(text, name, schedule.defined_temporaries(), statements, guards)
         if len(statements) > MAX_UNSPLIT_SIZE
         else None
     )
@@ -159,7 +159,7 @@ def function_text(kernel: KernelIR, name: str, dialect: Dialect) -> str:
         lines += (_lane_sincos_lines if dialect.vector else _vector_sincos_lines)(
             text, level.angles
         )
-    lines += guards.begun()
+    lines += guards.prologue()
     if parts is None:
         lines += [
             line for statement in statements for line in statement_text(text, statement, guards)
@@ -185,7 +185,9 @@ def _lane_sincos_lines(text: StraightText, angles: Sequence[Angle]) -> list[str]
     lines = []
     for angle in angles:
         pair = f"x{(angle.sines + angle.cosines)[0]}"
-        lines.append(f"const lanes_sincos_t {pair} = lanes_sincos({text.whole(angle.argument)});")
+        lines.append(
+            f"const lanes_sincos_t {pair} = lanes_sincos({text.lane_operand(angle.argument)});"
+        )
         lines += [f"const lanes_t t{number} = {pair}.sine;" for number in angle.sines]
         lines += [f"const lanes_t t{number} = {pair}.cosine;" for number in angle.cosines]
     return lines
@@ -207,7 +209,7 @@ def _vector_sincos_lines(text: StraightText, angles: Sequence[Angle]) -> list[st
 
 def _scalar_load(text: StraightText, operand: Operand) -> str:
     """C text of an argument, loaded as a scalar: a vector load would stall on recent stores."""
-    load_text = text.whole(operand)
+    load_text = text.lane_operand(operand)
     return f"*(const volatile real *)&{load_text}" if isinstance(operand, Element) else load_text
 
 

@@ -10,7 +10,7 @@ from mstmm.ir import scene_structure
 
 from ..schedule.differentiated_passes import D
 from ..schedule.slot_definitions import ROLES, SLOTS
-from .planar_storage import PLANAR_VARIABLES, planar_layout, planar_place
+from .planar_storage import PLANAR_VARIABLES, planar_layout, planar_slot_text
 
 #: Numbers of a body's block in the workspace, in their order: slot -> name in C.  Slots
 #: that the same passes use are adjacent, for cache lines; e follows S (links.c).
@@ -260,34 +260,40 @@ BODY_OF_SUBJECT = {
 
 
 @dataclass
-class SlotPlace:
+class SlotExpression:
     """C expression of a slot, and the variables it reads."""
 
     text: str
-    needs: set[str] = field(default_factory=set)
+    variables: set[str] = field(default_factory=set)
 
 
-def slot_place(slot: str, flat: bool = False) -> SlotPlace | None:
+def slot_expression(slot: str, flat: bool = False) -> SlotExpression | None:
     """Storage of a slot, of a planar scene if `flat`; None for a local slot."""
     if slot.startswith(D):
-        return _derivative_place(slot.removeprefix(D))
+        return _derivative_expression(slot.removeprefix(D))
     name, _, entry_index = slot.partition("[")
     slot = SHARED_SLOTS.get(name, name)
     text_of_slot = (
-        (planar_place(name) if flat else None) or _SLOT_TEXTS.get(slot) or _stored_place(slot)
+        (planar_slot_text(name) if flat else None)
+        or _SLOT_TEXTS.get(slot)
+        or _stored_expression(slot)
     )
     if text_of_slot is None:
         return None
     text = f"{text_of_slot} + {entry_index.rstrip(']')}" if entry_index else text_of_slot
-    return SlotPlace(text, {variable for variable in VARIABLES if reads_variable(text, variable)})
+    return SlotExpression(
+        text, {variable for variable in VARIABLES if reads_variable(text, variable)}
+    )
 
 
-def _derivative_place(slot: str) -> SlotPlace | None:
-    value = slot_place(slot)
+def _derivative_expression(slot: str) -> SlotExpression | None:
+    value = slot_expression(slot)
     if value is None:
         return None
     text = _derivative_text(value.text) or "mstmm_zeros"
-    return SlotPlace(text, {variable for variable in VARIABLES if reads_variable(text, variable)})
+    return SlotExpression(
+        text, {variable for variable in VARIABLES if reads_variable(text, variable)}
+    )
 
 
 #: Row index in a loop over rows, by slot.
@@ -301,7 +307,7 @@ _ROW_INDICES = {
 }  # fmt: skip
 
 
-def _stored_place(slot: str) -> str | None:
+def _stored_expression(slot: str) -> str | None:
     owner, _, name = slot.partition(".")
     if owner in ROLES:
         inner = f"body.{'motion' if name == 'w' else name}"
@@ -425,9 +431,9 @@ def layout_header() -> str:
         + "\n".join(lines)
         + "\n/* Behind them arrays of the speeds, from FIXED + their number times the speeds. */\n"
         + "\n".join(rows)
-        + "\n/* Flexible bodies and sections: arrays behind so many numbers per mode. */\n"
+        + "\n/* Flexible bodies and sections: arrays after a number of values per mode. */\n"
         + "\n".join([*_per_mode_constants(MODE_SLOTS), *_per_mode_constants(SECTION_SLOTS)])
-        + "\n/* A hinge that closes a loop; a coupling; a row. */\n"
+        + "\n/* A cut hinge; a coupling; a row. */\n"
         + "\n".join(
             [
                 *_offset_constants(CLOSURE_SLOTS, "MSTMM_CLOSURE"),
@@ -435,12 +441,12 @@ def layout_header() -> str:
                 *_offset_constants(ROW_SLOTS, "MSTMM_ROW"),
             ]
         )
-        + "\n/* A body in a plane, and what its record gives. */\n"
+        + "\n/* A body in a plane, and the values of its record. */\n"
         + "\n".join(planar_layout())
         + "\n/* cdef end */\n\n"
         + "/* Arrays of a flexible body of n modes, and of one of its sections. */\n"
         + "\n".join([*_offset_macros(MODE_SLOTS, _PAIRS), *_offset_macros(SECTION_SLOTS, "")])
-        + "\n/* What the tangent keeps of a body, of a flexible one, of a section. */\n"
+        + "\n/* Data of the tangent for a body, a flexible body, a section. */\n"
         + "\n".join(
             [
                 *_speed_offset_macros(TANGENT_SLOTS, "MSTMM_TANGENT_NUMBERS"),

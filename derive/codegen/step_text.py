@@ -23,12 +23,12 @@ from ..schedule.pass_steps import (
     ScatterSpeeds,
     SelectColumns,
     Step,
-    inner,
+    all_steps,
 )
 from ..schedule.slot_definitions import SLOTS
 from .kernel_calls import MAX_SPEEDS, Callee
 from .schedule_conditions import condition_text, condition_variables
-from .slot_storage import VARIABLES, SlotPlace, slot_place, slot_size
+from .slot_storage import VARIABLES, SlotExpression, slot_expression, slot_size
 
 #: Traits that only scene-specific code uses.
 FUSED_ONLY_TRAITS = frozenset({"staged", "link", "turned", "unmoved"})
@@ -124,14 +124,14 @@ class StepText:
 
     def __init__(self, kernels: dict[str, Callee], whole: Pass) -> None:
         self.kernels, self.name, self.subject = kernels, whole.name, whole.subject
-        self.flat, self.given = whole.flat, {slot: local_name(slot) for slot in whole.given}
-        self.at = "index"
+        self.flat, self.given_slots = whole.flat, {slot: local_name(slot) for slot in whole.given}
+        self.subject_index = "index"
         self.locals = self._local_sizes(whole)
 
-    def _place(self, slot: str) -> SlotPlace:
-        if slot in self.given:
-            return SlotPlace(self.given[slot])
-        slot_location = slot_place(slot, self.flat)
+    def _slot_expression(self, slot: str) -> SlotExpression:
+        if slot in self.given_slots:
+            return SlotExpression(self.given_slots[slot])
+        slot_location = slot_expression(slot, self.flat)
         if slot_location is not None:
             return slot_location
         name, _, entry_index = slot.partition("[")
@@ -140,7 +140,7 @@ class StepText:
         text = (
             f"{local_name(name)} + {entry_index.rstrip(']')}" if entry_index else local_name(name)
         )
-        return SlotPlace(text)
+        return SlotExpression(text)
 
     def _local_sizes(self, whole: Pass) -> dict[str, int]:
         """Local arrays, each as long as the longest port that uses it."""
@@ -149,7 +149,7 @@ class StepText:
             for part in () if is_fused_only(step) else _own_steps(step):
                 for slot, size in self._local_uses(part):
                     name, _, entry = slot.partition("[")
-                    if slot not in self.given and slot_place(name, self.flat) is None:
+                    if slot not in self.given_slots and slot_expression(name, self.flat) is None:
                         size = MAX_SPEEDS if entry == "k]" else size
                         if local_name(name) in VARIABLES:
                             raise ValueError(f"pass {self.name}: {name!r} shadows a variable")
@@ -172,14 +172,14 @@ class StepText:
         element, _, name = step.kernel.partition(".")
         return self.kernels[f"{'generic' if element.startswith('generic') else element}.{name}"]
 
-    def needs(self, step: Step) -> set[str]:
+    def required_variables(self, step: Step) -> set[str]:
         """Variables that a step reads."""
         slots: list[str] = []
         variables: set[str] = set()
         if isinstance(step, Call):
             callee, ports = self._callee(step), ports_of(step)
             slots = [ports[port] for port in callee.fields if port in ports]
-            variables = self._call_needs(step)
+            variables = self._call_variables(step)
         elif isinstance(step, (Copy, Add)):
             slots = [step.to, *([step.source] if step.source else [])]
             variables = {variable for slot in slots for variable in size_variables(slot)}
@@ -187,7 +187,8 @@ class StepText:
             slots, variables = [step.to, step.source], {step.count} & VARIABLES.keys()
         elif isinstance(step, (ForEachDirection, ForEach)):
             parts = [
-                self.needs(part) | condition_variables(part.when, self.flat) for part in step.steps
+                self.required_variables(part) | condition_variables(part.when, self.flat)
+                for part in step.steps
             ]
             table = _DIRECTION_LOOPS if isinstance(step, ForEachDirection) else _ROW_LOOPS
             return set(table[step.of][2]).union(*parts)
@@ -202,10 +203,14 @@ class StepText:
         elif isinstance(step, Evaluate):
             slots, variables = [step.to], {"force"}
         elif isinstance(step, EachSpeed):
-            return {"body"}.union(*(self.needs(part) for part in step.steps))
-        return variables.union(*(self._place(slot).needs for slot in slots)) if slots else variables
+            return {"body"}.union(*(self.required_variables(part) for part in step.steps))
+        return (
+            variables.union(*(self._slot_expression(slot).variables for slot in slots))
+            if slots
+            else variables
+        )
 
-    def _call_needs(self, step: Call) -> set[str]:
+    def _call_variables(self, step: Call) -> set[str]:
         element = step.kernel.partition(".")[0]
         variables: set[str] = set()
         if self._callee(step).kernel.size_symbol:
@@ -224,12 +229,15 @@ class StepText:
             return self._call_lines(step, indent)
         if isinstance(step, RunPass):
             assert step.whole is not None
-            return [f"{indent}code = mstmm_at_{step.whole.name}(state, {self.at});",
+            return [f"{indent}code = mstmm_at_{step.whole.name}(state, {self.subject_index});",
                     f"{indent}if (code) return code;"]  # fmt: skip
         if isinstance(step, (Copy, Add)):
             return self._copy_lines(step, indent)
         if isinstance(step, Move):
-            target, source = self._place(step.to).text, self._place(step.source).text
+            target, source = (
+                self._slot_expression(step.to).text,
+                self._slot_expression(step.source).text,
+            )
             return [f"{indent}memcpy({target}, {source}, (size_t)({step.count}) * sizeof(real));"]
         if isinstance(step, ForEachDirection):
             return self._direction_lines(step, indent)
@@ -240,17 +248,24 @@ class StepText:
         if isinstance(step, ScatterSpeeds):
             return self._scatter_lines(step, indent)
         if isinstance(step, Gather):
-            target, value_indices = self._place(step.to).text, self._place(step.places).text
+            target, value_indices = (
+                self._slot_expression(step.to).text,
+                self._slot_expression(step.places).text,
+            )
             count = slot_size(step.places)
             state_text = "state->slope" if step.to.startswith(D) else "state"
             value = f"mstmm_value_at({state_text}, {_entry_text(value_indices)})"
             return [f"{indent}for (int j = 0; j < {count}; j++)",
                     f"{indent}    {_entry_text(target)} = {value};"]  # fmt: skip
         if isinstance(step, Evaluate):
-            arguments = [self._place(slot).text for slot in (*dict(step.given).values(), step.to)]
+            arguments = [
+                self._slot_expression(slot).text for slot in (*dict(step.given).values(), step.to)
+            ]
             call = f"mstmm_given_effort(state, force->effort, {', '.join(arguments)})"
             if step.to.startswith(D):
-                arguments[1:1] = [self._place(D + slot).text for slot in dict(step.given).values()]
+                arguments[1:1] = [
+                    self._slot_expression(D + slot).text for slot in dict(step.given).values()
+                ]
                 call = (
                     f"mstmm_given_effort_slope(state, force->effort_slope, {', '.join(arguments)})"
                 )
@@ -267,7 +282,7 @@ class StepText:
             slot = ports.get(port, f"local.unused_{port}")
             if port not in ports and port not in outputs:
                 raise ValueError(f"{step.kernel}: no slot for the port {port!r}")
-            arguments.append(f".{name} = {self._place(slot).text}")
+            arguments.append(f".{name} = {self._slot_expression(slot).text}")
         unknown = ports.keys() - callee.fields.keys()
         if unknown and not isinstance(step, DifferentiatedCall):
             raise ValueError(f"{step.kernel} has no port {', '.join(sorted(unknown))}")
@@ -283,9 +298,9 @@ class StepText:
     def _call_head(self, step: Call, callee: Callee) -> str:
         element, _, kernel = step.kernel.partition(".")
         name = f"mstmm_{callee.name}"
-        if callee.by == "name":
+        if callee.call_kind == "name":
             return f"{name}("
-        if callee.by == "pointer":
+        if callee.call_kind == "pointer":
             suffix = SLOPE if isinstance(step, DifferentiatedCall) else ""
             kernel_suffix = suffix if element in ("law", "force") else kernel
             return f"{name}({_KERNEL_POINTERS[element].format(kernel_suffix)},"
@@ -298,12 +313,12 @@ class StepText:
         return [f"{indent}if (code) return mstmm_fail({state}, {macro}, {index}, code);"]
 
     def _copy_lines(self, step: Copy | Add, indent: str) -> list[str]:
-        target = self._place(step.to).text
+        target = self._slot_expression(step.to).text
         size = self._copy_size(step)
         if isinstance(step, Add):
             sign = "-=" if step.times < 0 else "+="
             factor = f"{abs(step.times)} * " if abs(step.times) != 1 else ""
-            source = self._place(step.source).text
+            source = self._slot_expression(step.source).text
             if size == "1":
                 return [
                     f"{indent}{_entry_text(target, '0')} {sign} {factor}{_entry_text(source, '0')};"
@@ -313,17 +328,19 @@ class StepText:
                 f"{indent}    {_entry_text(target)} {sign} {factor}{_entry_text(source)};",
             ]
         if size == "1":
-            value = _entry_text(self._place(step.source).text, "0") if step.source else "0"
+            value = (
+                _entry_text(self._slot_expression(step.source).text, "0") if step.source else "0"
+            )
             return [f"{indent}{_entry_text(target, '0')} = {value};"]
         if size.isdigit():
             if not step.source:
                 return [f"{indent}memset({target}, 0, {size} * sizeof(real));"]
-            source = self._place(step.source).text
+            source = self._slot_expression(step.source).text
             return [f"{indent}memcpy({target}, {source}, {size} * sizeof(real));"]
         if size.startswith("nu"):
-            source = f", {self._place(step.source).text}" if step.source else ""
+            source = f", {self._slot_expression(step.source).text}" if step.source else ""
             return [f"{indent}mstmm_set{'' if source else '_zero'}({target}{source}, {size});"]
-        value = _entry_text(self._place(step.source).text) if step.source else "0"
+        value = _entry_text(self._slot_expression(step.source).text) if step.source else "0"
         return [f"{indent}for (int j = 0; j < {size}; j++)",
                 f"{indent}    {_entry_text(target)} = {value};"]  # fmt: skip
 
@@ -334,7 +351,10 @@ class StepText:
         return str(self.locals[local_name(step.to)])
 
     def _select_lines(self, step: SelectColumns, indent: str) -> list[str]:
-        target, source = self._place(step.to).text, self._place(step.source).text
+        target, source = (
+            self._slot_expression(step.to).text,
+            self._slot_expression(step.source).text,
+        )
         if step.rows == 1:
             return [
                 f"{indent}for (int k = 0; k < speeds; k++)",
@@ -347,8 +367,8 @@ class StepText:
                 f"{_entry_text(source, f'{row} * nu + columns[k]')};"]  # fmt: skip
 
     def _scatter_lines(self, step: ScatterSpeeds, indent: str) -> list[str]:
-        target, free = self._place(step.to).text, self._place(step.free).text
-        imposed = _entry_text(self._place(step.imposed).text) if step.imposed else "0"
+        target, free = self._slot_expression(step.to).text, self._slot_expression(step.free).text
+        imposed = _entry_text(self._slot_expression(step.imposed).text) if step.imposed else "0"
         return [
             f"{indent}for (int j = 0, k = 0; j < nu; j++)",
             f"{indent}    {_entry_text(target)} = k < speeds && columns[k] == j ? "
@@ -380,9 +400,9 @@ class StepText:
 
     def _row_loop_lines(self, step: ForEach, indent: str) -> list[str]:
         order, declaration, _ = _ROW_LOOPS[step.of]
-        self.at = "r" if step.of in ("closings", "openings") else self.at
+        self.subject_index = "r" if step.of in ("closings", "openings") else self.subject_index
         body_lines = self._inner_lines(step.steps, indent + "    ")
-        self.at = "index"
+        self.subject_index = "index"
         declaration_lines = [f"{indent}    {declaration}"] if declaration else []
         return [f"{indent}for ({order}) {{", *declaration_lines, *body_lines, f"{indent}}}"]
 
@@ -419,7 +439,7 @@ def _own_steps(step: Step) -> Iterator[Step]:
         for part in step.steps:
             yield from _own_steps(part)
     elif not isinstance(step, RunPass):
-        yield from inner(step)
+        yield from all_steps(step)
 
 
 def is_fused_only(step: Step) -> bool:

@@ -66,9 +66,9 @@ class StraightText:
         if not OPERATIONS[op].truth:
             return [f"const {self.dialect.real} t{number} = {self._value(op, args)};"]
         truth = f"const {self.dialect.truth} m{number} = {self._comparison(op, args)};"
-        return [truth, *self.counted(number)]
+        return [truth, *self.truth_to_number(number)]
 
-    def counted(self, number: int) -> list[str]:
+    def truth_to_number(self, number: int) -> list[str]:
         """C lines that convert a truth value to a number, if any part uses it as such."""
         if number not in self._numbers:
             return []
@@ -80,15 +80,17 @@ class StraightText:
         port = self.ports[statement.port]
         sign = "+=" if port.accumulate else "="
         offset = port.offset(statement.index)
-        return f"{port_array_name(port.name)}[{offset}] {sign} {self.whole(statement.value)};"
+        return (
+            f"{port_array_name(port.name)}[{offset}] {sign} {self.lane_operand(statement.value)};"
+        )
 
     def truth(self, operand: Operand) -> str:
         """Whether an operand is true, that is, neither zero nor NaN."""
         if isinstance(operand, Temporary) and operand.number in self.truths:
             return f"m{operand.number}"
-        return f"{self.dialect.prefix}true({self.whole(operand)})"
+        return f"{self.dialect.prefix}true({self.lane_operand(operand)})"
 
-    def word(self, operand: Operand) -> str:
+    def operand_text(self, operand: Operand) -> str:
         """Operand of an arithmetic operator: a literal, an entry of a port or a temporary."""
         if isinstance(operand, Constant):
             return literal_text(operand.text)
@@ -96,25 +98,29 @@ class StraightText:
             return f"t{operand.number}"
         return f"{port_array_name(operand.port)}[{self.ports[operand.port].offset(operand.index)}]"
 
-    def whole(self, operand: Operand) -> str:
+    def lane_operand(self, operand: Operand) -> str:
         """An operand of the dialect's own type: a literal fills every lane."""
-        text = self.word(operand)
-        return f"lanes_all({text})" if self._bare(operand) else text
+        text = self.operand_text(operand)
+        return f"lanes_all({text})" if self._is_bare_literal(operand) else text
 
-    def _bare(self, operand: Operand) -> bool:
+    def _is_bare_literal(self, operand: Operand) -> bool:
         return self.dialect.vector and isinstance(operand, Constant)
 
     def _value(self, op: str, args: Sequence[Operand]) -> str:
         row = OPERATIONS[op]
         if row.sign:
-            left_text = self.whole(args[0]) if self._bare(args[1]) else self.word(args[0])
-            return f"{left_text} {row.sign} {self.word(args[1])}"
+            left_text = (
+                self.lane_operand(args[0])
+                if self._is_bare_literal(args[1])
+                else self.operand_text(args[0])
+            )
+            return f"{left_text} {row.sign} {self.operand_text(args[1])}"
         if op == "neg":
-            return f"-{self.whole(args[0])}"
+            return f"-{self.lane_operand(args[0])}"
         condition_count = row.conditions
         operand_texts = [
             *map(self.truth, args[:condition_count]),
-            *map(self.whole, args[condition_count:]),
+            *map(self.lane_operand, args[condition_count:]),
         ]
         return f"{self.dialect.prefix}{op}({', '.join(operand_texts)})"
 
@@ -123,11 +129,11 @@ class StraightText:
         if row.conditions:  # & and |: the order does not matter, and && does not accept vectors
             return f"{self.truth(args[0])} {row.sign[0]} {self.truth(args[1])}"
         if row.sign:
-            return f"{self.whole(args[0])} {row.sign} {self.whole(args[1])}"
+            return f"{self.lane_operand(args[0])} {row.sign} {self.lane_operand(args[1])}"
         (a,) = args
         if isinstance(a, Temporary) and a.number in self.truths:
             return f"{self.dialect.prefix}not(m{a.number})"
-        return f"{self.whole(a)} == {self.whole(Constant('0'))}"
+        return f"{self.lane_operand(a)} == {self.lane_operand(Constant('0'))}"
 
 
 def _used_as_numbers(statements: Iterable[object]) -> set[int]:

@@ -13,7 +13,7 @@ from itertools import groupby
 
 from mstmm.ir.interpreter import evaluate_floats
 
-from ..schedule.pass_steps import Call, Evaluate, Pass, RunPass, Step, inner
+from ..schedule.pass_steps import Call, Evaluate, Pass, RunPass, Step, all_steps
 from ..schedule.planar_passes import LOAD
 from ..schedule.sweeps import SINGLY, SWEEPS
 from .kernel_calls import Callee, Specs, collect_callees, dispatch_tables
@@ -38,7 +38,7 @@ def all_passes() -> list[Pass]:
 
     def visit(whole: Pass) -> None:
         for step in whole.steps:
-            for part in inner(step):
+            for part in all_steps(step):
                 if isinstance(part, RunPass) and part.whole is not None:
                     visit(part.whole)
         passes_by_name.setdefault(whole.name, whole)
@@ -151,7 +151,9 @@ def function_text(whole: Pass, kernels: Kernels) -> str:
     text = StepText(kernels, whole)
     steps = [_without_constant_traits(step) for step in whole.steps if not is_fused_only(step)]
     declared_variables = {whole.subject} & pass_variables(whole.flat).keys()
-    declared_variables |= {name for step in steps if not step.when for name in text.needs(step)}
+    declared_variables |= {
+        name for step in steps if not step.when for name in text.required_variables(step)
+    }
     conditions = (whole.skip, *(step.when for step in steps))
     declared_variables = _with_required_variables(
         declared_variables.union(*(condition_variables(c, whole.flat) for c in conditions)), whole
@@ -175,7 +177,7 @@ def function_text(whole: Pass, kernels: Kernels) -> str:
             )
             missing_variables = (
                 _with_required_variables(
-                    {name for step in group for name in text.needs(step)}, whole
+                    {name for step in group for name in text.required_variables(step)}, whole
                 )
                 - declared_variables
             )
@@ -211,7 +213,7 @@ def _without_constant_traits(step: Step) -> Step:
 
 
 def _generated_steps(step: Step) -> Iterable[Step]:
-    return [step] if isinstance(step, RunPass) else inner(step)
+    return [step] if isinstance(step, RunPass) else all_steps(step)
 
 
 def _can_fail(step: Step) -> bool:

@@ -29,14 +29,14 @@ _LaneOperands = tuple[Operand, ...]
 
 @dataclass(frozen=True)
 class LaneValue:
-    """Value in every lane: `op` of `args`, or without `op` the entry `place` of a port.
+    """Value in every lane: `op` of `args`, or without `op` the entry `entry` of a port.
 
     The entry moves along `axis` from lane to lane."""
 
     number: int
     op: str
     args: tuple[LaneValue | Operand, ...]
-    place: Element | None = None
+    entry: Element | None = None
     axis: int = 0
 
 
@@ -46,12 +46,12 @@ class VectorLoop:
 
     port: Port
     axis: int
-    shared: list[int] = field(default_factory=list)
+    shared_temporaries: list[int] = field(default_factory=list)
     values: list[LaneValue] = field(default_factory=list)
     stores: list[tuple[tuple[int, ...], LaneValue]] = field(default_factory=list)
 
     @property
-    def taken_off(self) -> dict[int, LaneValue]:
+    def subtracted_values(self) -> dict[int, LaneValue]:
         """Negated values that are only added to the port, with the value to subtract instead."""
         used_numbers = {a.number for v in self.values for a in v.args if isinstance(a, LaneValue)}
         added_values = (v for _, v in self.stores) if self.port.accumulate else ()
@@ -81,34 +81,34 @@ class VectorLoops:
                 f"{kernel.name}: expected a fixed size, found a kernel of run-time size"
             )
         self.kernel = kernel
-        self.assigned = {s.number: s for s in kernel.statements if isinstance(s, Assign)}
+        self.assignments = {s.number: s for s in kernel.statements if isinstance(s, Assign)}
         self.ports = {port.name: port for port in kernel.outputs}
-        self.kept: dict[Operand, Element] = {}
+        self.stored_entries: dict[Operand, Element] = {}
         self.loops = [self._vector_loop(self.ports[name], axis) for name, axis in requests]
         looped_names = {name for name, _ in requests}
         remaining_statements = [s for s in kernel.statements if not isinstance(s, Assign)]
         if not all(isinstance(s, Store) for s in remaining_statements):
             raise ValueError(f"{kernel.name}: vector loops support no guards")
-        self.others = [
+        self.other_stores = [
             s for s in remaining_statements if isinstance(s, Store) and s.port not in looped_names
         ]
 
-    def needed(self, operands: Sequence[Operand]) -> list[Assign]:
+    def required_assignments(self, operands: Sequence[Operand]) -> list[Assign]:
         """Assignments needed for `operands`, in kernel order, except values read from outputs."""
         numbers: set[int] = set()
         stack = list(operands)
         while stack:
             operand = stack.pop()
-            if not isinstance(operand, Temporary) or operand in self.kept:
+            if not isinstance(operand, Temporary) or operand in self.stored_entries:
                 continue
             if operand.number not in numbers:
                 numbers.add(operand.number)
-                stack.extend(self.assigned[operand.number].args)
-        return [s for number, s in self.assigned.items() if number in numbers]
+                stack.extend(self.assignments[operand.number].args)
+        return [s for number, s in self.assignments.items() if number in numbers]
 
     def read(self, operand: Operand) -> Operand:
         """Output entry that stores an operand, or the operand."""
-        return self.kept.get(operand, operand)
+        return self.stored_entries.get(operand, operand)
 
     def _vector_loop(self, port: Port, axis: int) -> VectorLoop:
         stored_values = {s.index: s.value for s in self.kernel.statements
@@ -122,7 +122,7 @@ class VectorLoops:
                 )
                 loop.store(index, lanes)
         if not port.accumulate:
-            self.kept |= {
+            self.stored_entries |= {
                 value: Element(port.name, index)
                 for index, value in stored_values.items()
                 if isinstance(value, Temporary)
@@ -134,9 +134,9 @@ class _Builder:
     """Builder of one vector loop."""
 
     def __init__(self, whole: VectorLoops, loop: VectorLoop) -> None:
-        self.whole, self.loop = whole, loop
-        self.known: dict[_LaneOperands, LaneValue] = {}
-        self.like: dict[tuple[Operand, Operand, int], bool] = {}
+        self.vector_loops, self.loop = whole, loop
+        self.lane_values: dict[_LaneOperands, LaneValue] = {}
+        self.is_alike_cache: dict[tuple[Operand, Operand, int], bool] = {}
 
     def store(self, index: tuple[int | str, ...], lanes: _LaneOperands) -> None:
         value = self.value(lanes)
@@ -145,64 +145,68 @@ class _Builder:
         self.loop.stores.append((tuple(int(entry) for entry in index), value))
 
     def error(self, text: str) -> ValueError:
-        return ValueError(f"{self.whole.kernel.name}: {text}")
+        return ValueError(f"{self.vector_loops.kernel.name}: {text}")
 
     def value(self, lanes: _LaneOperands) -> LaneValue | Operand:
         """Value of the operands, one per lane."""
         if all(lane == lanes[0] for lane in lanes):
-            return self.shared(lanes[0])
-        value = self.known.get(lanes)
+            return self.share_operand(lanes[0])
+        value = self.lane_values.get(lanes)
         if value is None:
-            value = self.known[lanes] = self._new_value(lanes)
+            value = self.lane_values[lanes] = self._new_value(lanes)
             self.loop.values.append(value)
         return value
 
-    def shared(self, operand: Operand) -> Operand:
-        operand = self.whole.read(operand)
-        if isinstance(operand, Temporary) and operand.number not in self.loop.shared:
-            self.loop.shared.append(operand.number)
+    def share_operand(self, operand: Operand) -> Operand:
+        operand = self.vector_loops.read(operand)
+        if isinstance(operand, Temporary) and operand.number not in self.loop.shared_temporaries:
+            self.loop.shared_temporaries.append(operand.number)
         return operand
 
     def _new_value(self, lanes: _LaneOperands) -> LaneValue:
         number = len(self.loop.values)
-        entries = [self.whole.read(lane) for lane in lanes]
+        entries = [self.vector_loops.read(lane) for lane in lanes]
         axis = _moving_axis(entries)
         if axis is not None:
             assert isinstance(entries[0], Element)
             return LaneValue(number, "", (), entries[0], axis)
-        if not all(self.alike(lanes[0], lane, k) for k, lane in enumerate(lanes)):
+        if not all(self.is_alike(lanes[0], lane, k) for k, lane in enumerate(lanes)):
             raise self.error(f"entries of {self.loop.port.name} are not computed alike")
         rows = [self._lane_arguments(lanes[0], lane, k) for k, lane in enumerate(lanes)]
         args = tuple(self.value(column) for column in zip(*rows, strict=True))
         first_lane = lanes[0]
         assert isinstance(first_lane, Temporary)
-        return LaneValue(len(self.loop.values), self.whole.assigned[first_lane.number].op, args)
+        return LaneValue(
+            len(self.loop.values), self.vector_loops.assignments[first_lane.number].op, args
+        )
 
     def _lane_arguments(self, first: Operand, operand: Operand, k: int) -> tuple[Operand, ...]:
         """Operands of lane k, in the order of those of the first lane."""
         assert isinstance(first, Temporary) and isinstance(operand, Temporary)
         reference_args, operand_args = (
-            self.whole.assigned[o.number].args for o in (first, operand)
+            self.vector_loops.assignments[o.number].args for o in (first, operand)
         )
-        if all(self.alike(a, b, k) for a, b in zip(reference_args, operand_args, strict=True)):
+        if all(self.is_alike(a, b, k) for a, b in zip(reference_args, operand_args, strict=True)):
             return operand_args
         return operand_args[::-1]
 
-    def alike(self, first: Operand, operand: Operand, k: int) -> bool:
+    def is_alike(self, first: Operand, operand: Operand, k: int) -> bool:
         """Whether an operand of lane k has the same computation as in the first lane."""
         key = first, operand, k
-        if key not in self.like:
-            self.like[key] = first == operand or self._has_same_computation(first, operand, k)
-        return self.like[key]
+        if key not in self.is_alike_cache:
+            self.is_alike_cache[key] = first == operand or self._has_same_computation(
+                first, operand, k
+            )
+        return self.is_alike_cache[key]
 
     def _has_same_computation(self, first: Operand, other: Operand, k: int) -> bool:
-        entries = [self.whole.read(operand) for operand in (first, other)]
+        entries = [self.vector_loops.read(operand) for operand in (first, other)]
         if _moving_axis([entries[0], *[None] * (k - 1), entries[1]]) is not None:
             return True
         if not isinstance(first, Temporary) or not isinstance(other, Temporary):
             return False
         reference_assignment, operand_assignment = (
-            self.whole.assigned[o.number] for o in (first, other)
+            self.vector_loops.assignments[o.number] for o in (first, other)
         )
         row = OPERATIONS[reference_assignment.op]
         if (
@@ -218,7 +222,10 @@ class _Builder:
             else [operand_assignment.args]
         )
         return any(
-            all(self.alike(a, b, k) for a, b in zip(reference_assignment.args, order, strict=True))
+            all(
+                self.is_alike(a, b, k)
+                for a, b in zip(reference_assignment.args, order, strict=True)
+            )
             for order in orders
         )
 

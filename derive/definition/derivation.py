@@ -47,7 +47,7 @@ class Quantity:
         return rows, columns
 
     @property
-    def sized(self) -> bool:
+    def has_runtime_size(self) -> bool:
         """Whether an extent is a run-time size."""
         return any(isinstance(extent, str) for extent in self.shape)
 
@@ -105,7 +105,7 @@ class Derivation:
 
         def quantity(q: Quantity) -> Quantity:
             symbol = q.symbol.xreplace(replacements)
-            return replace(q, symbol=symbol, symmetric=q.symmetric and not q.sized)
+            return replace(q, symbol=symbol, symmetric=q.symmetric and not q.has_runtime_size)
 
         def equation(e: Equation) -> Equation:
             computed = None if e.computed is None else e.computed.xreplace(replacements)
@@ -185,7 +185,7 @@ class Factor(sp.MatrixExpr):
 
 
 class Triangular(sp.MatrixExpr):
-    """L^-1 B, or L^-T B if `transposed`; L is the unit lower triangle of `factor`.
+    """L^-1 B, or L^-T B if `is_transposed`; L is the unit lower triangle of `factor`.
 
     Lowered to unrolled substitution; the diagonal and the part above it are not read.
     """
@@ -204,7 +204,7 @@ class Triangular(sp.MatrixExpr):
         return self.args[1]
 
     @property
-    def transposed(self) -> bool:
+    def is_transposed(self) -> bool:
         return bool(self.args[2])
 
     @property
@@ -214,7 +214,7 @@ class Triangular(sp.MatrixExpr):
     def _entry(self, i: sp.Expr, j: sp.Expr, **kwargs: object) -> sp.Expr:
         n = int(self.args[0].shape[0])
         lower = sp.Matrix(n, n, lambda r, c: self.args[0][r, c] if r > c else sp.Integer(r == c))
-        return ((lower.T if self.transposed else lower).inv() * sp.Matrix(self.args[1]))[i, j]
+        return ((lower.T if self.is_transposed else lower).inv() * sp.Matrix(self.args[1]))[i, j]
 
 
 class Triangle(sp.MatrixExpr):

@@ -73,14 +73,14 @@ class _Definition(NotebookDisplay):
 class Hinge(_Definition):
     """Motion of the outboard point P relative to the inboard point Q.
 
-    `frame` is the orientation of the hinge frame in a scene and `keys` are the keys of a
+    `frame_rule` is the orientation of the hinge frame in a scene and `scene_keys` are the keys of a
     scene's hinge that it reads (`mstmm.ir.hinge_properties.FRAMES`); other parameters are given
-    by name.  `allows` describes the free motion in a few words.
+    by name.  `motion_text` describes the free motion in a few words.
 
     Subclasses declare the class attributes and `rotation` (P axes to Q axes, 3 x 3) and
     `position` (P from Q in Q axes, 3 x 1), both in the hinge frame.  The motion subspace and
     the bias acceleration follow from them.  Speeds are the rates of the coordinates unless
-    `rates` gives qdot = N(q) u.
+    `coordinate_rates` gives qdot = N(q) u.
     """
 
     name: ClassVar[str]
@@ -89,11 +89,11 @@ class Hinge(_Definition):
     speeds: ClassVar[tuple[Param, ...] | None] = None
     parameters: ClassVar[tuple[Param, ...]] = ()
     sources: ClassVar[tuple[str, ...]] = ()
-    allows: ClassVar[str] = ""
-    frame: ClassVar[str] = "axis"
-    keys: ClassVar[tuple[str, ...]] = ("axis",)
+    motion_text: ClassVar[str] = ""
+    frame_rule: ClassVar[str] = "axis"
+    scene_keys: ClassVar[tuple[str, ...]] = ("axis",)
     #: Hinge whose kernels this one uses; the two differ only in their scene keys.
-    runs_as: ClassVar[str] = ""
+    equivalent_builtin: ClassVar[str] = ""
 
     def rotation(self, q: Symbols, p: Symbols) -> sp.Matrix:
         """Rotation from P axes to Q axes (3 x 3, orthogonal for every q)."""
@@ -103,19 +103,19 @@ class Hinge(_Definition):
         """P from Q in Q axes (3 x 1), m."""
         return sp.zeros(3, 1)
 
-    def rates(self, q: Symbols, u: Symbols, p: Symbols) -> sp.Matrix | None:
+    def coordinate_rates(self, q: Symbols, u: Symbols, p: Symbols) -> sp.Matrix | None:
         """Coordinate rates from speeds; None if speeds are the coordinate rates."""
         return None
 
-    def subspace(self, q: Symbols, p: Symbols) -> sp.Matrix | None:
+    def motion_subspace(self, q: Symbols, p: Symbols) -> sp.Matrix | None:
         """Stated H (6 x nu, rows v then w, P axes); checked against the derived one."""
         return None
 
-    def bias(self, q: Symbols, u: Symbols, p: Symbols) -> sp.Matrix | None:
+    def bias_acceleration(self, q: Symbols, u: Symbols, p: Symbols) -> sp.Matrix | None:
         """Stated acceleration at zero udot (6 x 1, P axes); checked."""
         return None
 
-    def singular_when(self, q: Symbols, p: Symbols) -> sp.Expr | None:
+    def singularity_measure(self, q: Symbols, p: Symbols) -> sp.Expr | None:
         """Expression that tends to zero at a singularity; a run warns below 1e-3."""
         return None
 
@@ -137,7 +137,7 @@ class Body(_Definition):
     parameters: ClassVar[tuple[Param, ...]] = ()
     sources: ClassVar[tuple[str, ...]] = ()
     #: True if packing converts the parameters to hinge axes about the input end.
-    in_hinge_axes: ClassVar[bool] = False
+    uses_hinge_axes: ClassVar[bool] = False
 
     def residual(self, a: sp.Matrix, alpha: sp.Matrix, w: sp.Matrix, p: Symbols) -> sp.Matrix:
         """Required [force; moment] at the input end, 6 x 1, body axes."""
@@ -185,13 +185,13 @@ class ForceElement(_Definition):
         """Functions (n x 1) of x and the rotation on which the potential depends."""
         return None
 
-    def defined_when(self, x: sp.Matrix, p: Symbols) -> sp.Basic | None:
+    def domain(self, x: sp.Matrix, p: Symbols) -> sp.Basic | None:
         """Condition under which the wrench is defined; the run stops where it fails."""
         return None
 
-    def defined_within(self, x: sp.Matrix, rotation: sp.Matrix, p: Symbols) -> sp.Basic | None:
+    def domain_by_rotation(self, x: sp.Matrix, rotation: sp.Matrix, p: Symbols) -> sp.Basic | None:
         """Condition on x and the rotation under which the wrench is defined."""
-        return self.defined_when(x, p)
+        return self.domain(x, p)
 
 
 def rotation_about(axis: int | tuple[sp.Expr, sp.Expr, sp.Expr], angle: sp.Expr) -> sp.Matrix:

@@ -12,7 +12,7 @@ _SERIES_LIMIT = sp.Rational(1, 100)
 _TERMS = 9
 
 
-def turning_rate(value: sp.Basic, rotation: sp.Matrix, w: sp.Matrix) -> sp.Basic:
+def rotating_derivative(value: sp.Basic, rotation: sp.Matrix, w: sp.Matrix) -> sp.Basic:
     """Time derivative of an expression or matrix in the rotation R, with R' = w~ R."""
     entries = [sp.Dummy(real=True) for _ in rotation]
     matrix, time = sp.Matrix(3, 3, entries), sp.Dummy(real=True)

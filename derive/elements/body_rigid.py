@@ -27,7 +27,7 @@ class RigidBody(Body):
     title = "rigid body"
     parameters = PARAMETERS
     sources = ("Rui, Wang, Zhang, ch. 5, (5.20)-(5.25)",)
-    in_hinge_axes = True
+    uses_hinge_axes = True
 
     def residual(self, a: sp.Matrix, alpha: sp.Matrix, w: sp.Matrix, p: Symbols) -> sp.Matrix:
         moment, inertia = sp.Matrix([p.mcx, p.mcy, p.mcz]), inertia_tensor(p)

@@ -68,5 +68,5 @@ class Bearing(ForceElement):
     def potential(self, deflection: sp.Matrix, p: Symbols) -> sp.Expr:
         return force_bushing6.Bushing().potential(deflection, p)
 
-    def defined_within(self, x: sp.Matrix, rotation: sp.Matrix, p: Symbols) -> sp.Basic:
-        return force_bushing6.Bushing().defined_within(x, rotation, p)
+    def domain_by_rotation(self, x: sp.Matrix, rotation: sp.Matrix, p: Symbols) -> sp.Basic:
+        return force_bushing6.Bushing().domain_by_rotation(x, rotation, p)

@@ -62,5 +62,5 @@ class Bushing(ForceElement):
         preload = sp.Matrix(list(p)[first : first + 6])
         return deflection.dot(_symmetric(p, 0) * deflection / 2 - preload)
 
-    def defined_within(self, x: sp.Matrix, rotation: sp.Matrix, p: Symbols) -> sp.Basic:
+    def domain_by_rotation(self, x: sp.Matrix, rotation: sp.Matrix, p: Symbols) -> sp.Basic:
         return 1 + rotation.trace() > sp.Rational(3, 100)

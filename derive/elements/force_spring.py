@@ -37,5 +37,5 @@ class Spring(ForceElement):
     def potential(self, x: sp.Matrix, p: Symbols) -> sp.Expr:
         return p.stiffness * (sp.sqrt(x.dot(x)) - p.rest) ** 2 / 2
 
-    def defined_when(self, x: sp.Matrix, p: Symbols) -> sp.Basic:
+    def domain(self, x: sp.Matrix, p: Symbols) -> sp.Basic:
         return x.dot(x) > sp.Rational(1, 10**24)

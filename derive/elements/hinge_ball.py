@@ -11,8 +11,8 @@ class Ball(Hinge):
 
     name = "ball"
     title = "ball hinge"
-    allows = "free rotation"
-    frame = "own"
+    motion_text = "free rotation"
+    frame_rule = "own"
     coordinates = tuple(Param(n, "", "unit quaternion, outboard to inboard") for n in "wxyz")
     speeds = tuple(Param(f"w{n}", "rad/s", "angular velocity, outboard axes") for n in "xyz")
     sources = ("Rui, Wang, Zhang, ch. 5, (5.39)-(5.43)",)
@@ -20,5 +20,5 @@ class Ball(Hinge):
     def rotation(self, q: Symbols, p: Symbols) -> sp.Matrix:
         return rotation_of(*q)
 
-    def rates(self, q: Symbols, u: Symbols, p: Symbols) -> sp.Matrix:
+    def coordinate_rates(self, q: Symbols, u: Symbols, p: Symbols) -> sp.Matrix:
         return rate_of(sp.Matrix(list(q)), sp.Matrix(list(u)))

@@ -10,7 +10,7 @@ class Cylindrical(Hinge):
 
     name = "cylindrical"
     title = "cylindrical hinge"
-    allows = "rotation and translation along one axis"
+    motion_text = "rotation and translation along one axis"
     coordinates = (
         Param("displacement", "m", "translation along the hinge axis"),
         Param("angle", "rad", "rotation about the hinge axis"),

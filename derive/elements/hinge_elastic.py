@@ -8,5 +8,5 @@ class Elastic(Free):
 
     name = "elastic"
     title = "elastic hinge"
-    allows = "spring and damper in six directions"
-    runs_as = "free"
+    motion_text = "spring and damper in six directions"
+    equivalent_builtin = "free"

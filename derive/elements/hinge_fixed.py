@@ -8,6 +8,6 @@ class Fixed(Hinge):
 
     name = "fixed"
     title = "fixed hinge"
-    allows = "rigid connection"
-    frame = "own"
-    keys = ()
+    motion_text = "rigid connection"
+    frame_rule = "own"
+    scene_keys = ()

@@ -10,7 +10,7 @@ COORDINATES = (
     *(Param(f"q{n}", "", "unit quaternion, outboard to inboard") for n in "wxyz"),
 )
 SPEEDS = (
-    *(Param(f"v{n}", "m/s", "velocity of P against Q, outboard axes") for n in "xyz"),
+    *(Param(f"v{n}", "m/s", "velocity of P relative to Q, outboard axes") for n in "xyz"),
     *(Param(f"w{n}", "rad/s", "angular velocity, outboard axes") for n in "xyz"),
 )
 
@@ -20,8 +20,8 @@ class Free(Hinge):
 
     name = "free"
     title = "free hinge"
-    allows = "six degrees of freedom"
-    frame = "own"
+    motion_text = "six degrees of freedom"
+    frame_rule = "own"
     coordinates = COORDINATES
     speeds = SPEEDS
 
@@ -31,7 +31,7 @@ class Free(Hinge):
     def position(self, q: Symbols, p: Symbols) -> sp.Matrix:
         return sp.Matrix(list(q)[:3])
 
-    def rates(self, q: Symbols, u: Symbols, p: Symbols) -> sp.Matrix:
+    def coordinate_rates(self, q: Symbols, u: Symbols, p: Symbols) -> sp.Matrix:
         velocity, spin = sp.Matrix(list(u)[:3]), sp.Matrix(list(u)[3:])
         orientation = sp.Matrix(list(q)[3:])
         return sp.Matrix.vstack(rotation_of(*orientation) * velocity, rate_of(orientation, spin))

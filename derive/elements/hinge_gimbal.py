@@ -10,9 +10,9 @@ class Gimbal(Hinge):
 
     name = "gimbal"
     title = "gimbal hinge (three angles)"
-    allows = "three angles, R = Rz(angle3) Ry(angle2) Rx(angle1)"
-    frame = "own"
-    keys = ()
+    motion_text = "three angles, R = Rz(angle3) Ry(angle2) Rx(angle1)"
+    frame_rule = "own"
+    scene_keys = ()
     coordinates = (
         Param("angle1", "rad", "rotation about x"),
         Param("angle2", "rad", "rotation about y"),
@@ -24,5 +24,5 @@ class Gimbal(Hinge):
             rotation_about(2, q.angle3) * rotation_about(1, q.angle2) * rotation_about(0, q.angle1)
         )
 
-    def singular_when(self, q: Symbols, p: Symbols) -> sp.Expr:
+    def singularity_measure(self, q: Symbols, p: Symbols) -> sp.Expr:
         return sp.cos(q.angle2)

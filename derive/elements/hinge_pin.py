@@ -10,7 +10,7 @@ class Pin(Hinge):
 
     name = "pin"
     title = "pin hinge"
-    allows = "rotation about one axis"
+    motion_text = "rotation about one axis"
     coordinates = (Param("angle", "rad", "rotation about the hinge axis"),)
     sources = ("Rui, Wang, Zhang, ch. 5, (5.50)-(5.54)",)
 

@@ -10,9 +10,9 @@ class Planar(Hinge):
 
     name = "planar"
     title = "planar hinge"
-    allows = "translation in a plane and rotation about its normal"
-    frame = "plane"
-    keys = ("axis", "axis2")
+    motion_text = "translation in a plane and rotation about its normal"
+    frame_rule = "plane"
+    scene_keys = ("axis", "axis2")
     coordinates = (
         Param("x", "m", "translation along the in-plane axis"),
         Param("y", "m", "translation along normal x in-plane axis"),

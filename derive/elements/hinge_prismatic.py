@@ -10,7 +10,7 @@ class Prismatic(Hinge):
 
     name = "prismatic"
     title = "prismatic hinge"
-    allows = "translation along one axis"
+    motion_text = "translation along one axis"
     coordinates = (Param("displacement", "m", "translation along the hinge axis"),)
 
     def position(self, q: Symbols, p: Symbols) -> sp.Matrix:

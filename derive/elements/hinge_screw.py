@@ -10,8 +10,8 @@ class Screw(Hinge):
 
     name = "screw"
     title = "screw hinge"
-    allows = "rotation with translation along its axis"
-    keys = ("axis", "lead")
+    motion_text = "rotation with translation along its axis"
+    scene_keys = ("axis", "lead")
     coordinates = (Param("angle", "rad", "rotation about the hinge axis"),)
     parameters = (Param("lead", "m", "translation per turn"),)
 

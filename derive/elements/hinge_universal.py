@@ -14,9 +14,9 @@ class Universal(Hinge):
 
     name = "universal"
     title = "universal hinge"
-    allows = "rotation about two axes in turn"
-    frame = "crossing"
-    keys = ("axis", "axis2")
+    motion_text = "rotation about two axes in turn"
+    frame_rule = "crossing"
+    scene_keys = ("axis", "axis2")
     coordinates = (
         Param("angle1", "rad", "rotation about the first axis (fixed in the inboard body)"),
         Param("angle2", "rad", "rotation about the second axis (fixed in the outboard body)"),

@@ -21,7 +21,7 @@ def column(array: sp.MatrixSymbol) -> sp.ImmutableDenseMatrix:
 
 
 def stack(*parts: sp.Basic) -> sp.BlockMatrix:
-    """Stacked columns."""
+    """Block column with the parts on top of each other."""
     return sp.BlockMatrix([[single] for single in parts])
 
 

@@ -19,7 +19,7 @@ from .block_matrices import symbol
 SOURCES = ("Householder, J. ACM 5 (1958) 339-342 (reflections)",)
 
 #: Rows of W; each is a load along a free or a constrained direction.
-DIRECTIONS = Quantity(symbol("W", 6, 6), "", "rows: H^+, then what the hinge holds")
+DIRECTIONS = Quantity(symbol("W", 6, 6), "", "rows: H^+, then the constrained directions")
 
 
 def complement(nu: int) -> Derivation:
@@ -46,7 +46,7 @@ def complement(nu: int) -> Derivation:
         if nu < 6:
             equations.append(
                 Equation(
-                    f"N, behind mirror {k + 1}",
+                    f"N after reflection {k + 1}",
                     next_matrix,
                     _apply_reflection(mirrors[k], constrained),
                 )
@@ -64,7 +64,7 @@ def complement(nu: int) -> Derivation:
     equations.append(Equation("W", DIRECTIONS.symbol, sp.ImmutableDenseMatrix(rows)))
     return Derivation(
         f"generic{nu}",
-        f"what a hinge with {nu} speeds lets go and holds",
+        f"free and constrained directions of a hinge with {nu} speeds",
         (h,),
         (DIRECTIONS,),
         tuple(equations),
@@ -86,9 +86,9 @@ def _reflection(
             f"length of column {k + 1}", size,
             sp.ImmutableDenseMatrix([sp.sqrt(sum(matrix[i, k] ** 2 for i in range(k, 6)))]),
         ),
-        Equation(f"mirror {k + 1}", v, sp.ImmutableDenseMatrix(entries)),
+        Equation(f"reflection vector {k + 1}", v, sp.ImmutableDenseMatrix(entries)),
         Equation(
-            f"2 / v^T v of mirror {k + 1}", b,
+            f"2 / v^T v of reflection vector {k + 1}", b,
             sp.ImmutableDenseMatrix([sp.Piecewise((1 / share, share > 0), (0, True))]),
         ),
     ]  # fmt: skip

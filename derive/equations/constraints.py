@@ -34,17 +34,20 @@ import sympy as sp
 from ..definition.derivation import Derivation, Equation, Quantity, tilde
 from .block_matrices import column, part, stack, symbol
 from .constrained_directions import DIRECTIONS
-from .loop_closure import APART, SLIP, TURN
+from .loop_closure import OFFSET, ROTATION, VELOCITY_ERROR
 
 #: Least square of a length used as a divisor, m^2: coincident points, a disc that lies flat.
 _POINT = sp.Rational(1, 10**24)
 
 _ZERO = sp.ImmutableDenseMatrix([0, 0, 0])
-_GAP = Quantity(symbol("gap", 6), "m", "what the constraint lacks, axes of C")
+_GAP = Quantity(symbol("gap", 6), "m", "position gap of the constraint, axes of C")
 _DRIFT = Quantity(
-    symbol("drift", 6), "", "rate of the slip in the bias motion, axes of C", accumulate=True
+    symbol("drift", 6),
+    "",
+    "rate of the velocity error in the bias motion, axes of C",
+    accumulate=True,
 )
-_LENGTH = Quantity(symbol("p", 1), "m", "the distance that is kept")
+_LENGTH = Quantity(symbol("p", 1), "m", "prescribed distance")
 _HEIGHT = Quantity(symbol("p", 1), "m", "height of the plane over C")
 _DISC = Quantity(
     symbol("p", 5), "m, -",
@@ -88,13 +91,13 @@ def _directions(rows: list[list[sp.Expr]]) -> sp.ImmutableDenseMatrix:
 
 def distance() -> Derivation:
     """Row of a distance, along the line between both points."""
-    d, length = column(APART.symbol), _LENGTH.symbol[0, 0]
+    d, length = column(OFFSET.symbol), _LENGTH.symbol[0, 0]
     size, direction, equations = _line_direction(d)
     row = [*(direction[i, 0] for i in range(3)), *[sp.Integer(0)] * 3]
     return Derivation(
         "loops",
-        "row of a distance that is kept",
-        (_LENGTH, APART),
+        "row of a distance constraint",
+        (_LENGTH, OFFSET),
         (DIRECTIONS, _GAP),
         (
             *equations,
@@ -108,13 +111,13 @@ def distance() -> Derivation:
 
 def distance_drift() -> Derivation:
     """Contribution of the rotating line to the rate of its row."""
-    d, speed = column(APART.symbol), part(SLIP.symbol, 0)
+    d, speed = column(OFFSET.symbol), part(VELOCITY_ERROR.symbol, 0)
     (size, direction, equations), rate = _line_direction(d), symbol("rate", 1)
     across = (_dot(speed, speed) - rate[0, 0] ** 2) / size[0, 0]
     return Derivation(
         "loops",
-        "rate of the row of a distance",
-        (APART, SLIP),
+        "rate of the row of a distance constraint",
+        (OFFSET, VELOCITY_ERROR),
         (_DRIFT,),
         (
             *equations,
@@ -126,12 +129,12 @@ def distance_drift() -> Derivation:
 
 def plane() -> Derivation:
     """Row of a point on the plane z = p of C."""
-    height = APART.symbol[2, 0] - _HEIGHT.symbol[0, 0]
+    height = OFFSET.symbol[2, 0] - _HEIGHT.symbol[0, 0]
     row = [sp.Integer(i == 2) for i in range(6)]
     return Derivation(
         "loops",
-        "row of a point on a plane",
-        (_HEIGHT, APART),
+        "row of a point-on-plane constraint",
+        (_HEIGHT, OFFSET),
         (DIRECTIONS, _GAP),
         (
             Equation("W", DIRECTIONS.symbol, _directions([row])),
@@ -146,7 +149,7 @@ def _contact_geometry() -> tuple[tuple[sp.MatrixSymbol, ...], list[Equation]]:
     axis = part(_DISC.symbol, 2)
     up = sp.ImmutableDenseMatrix([0, 0, 1])
     return (e, m, size, lever), [
-        Equation("e", e, TURN.symbol.T * axis),
+        Equation("e", e, ROTATION.symbol.T * axis),
         Equation("m", m, up - _scale_vector(e[2, 0], e)),
         Equation("|m|", size, sp.ImmutableDenseMatrix([_norm(m)])),
         Equation("rho", lever, _scale_vector(-_DISC.symbol[1, 0] / size[0, 0], m)),
@@ -161,11 +164,11 @@ def rolling() -> Derivation:
         force = sp.ImmutableDenseMatrix([sp.Integer(i == axis) for i in range(3)])
         moment = tilde(column(lever)) * force
         rows.append([*force, *(moment[i, 0] for i in range(3))])
-    height = APART.symbol[2, 0] + lever[2, 0] - _DISC.symbol[0, 0]
+    height = OFFSET.symbol[2, 0] + lever[2, 0] - _DISC.symbol[0, 0]
     return Derivation(
         "loops",
         "rows of a disc that rolls on a plane",
-        (_DISC, TURN, APART),
+        (_DISC, ROTATION, OFFSET),
         (DIRECTIONS, _GAP),
         (
             *equations,
@@ -178,7 +181,7 @@ def rolling() -> Derivation:
 def rolling_drift() -> Derivation:
     """Contribution of the moving contact point to the rate of the rows: w x rho'."""
     (e, m, size, _), equations = _contact_geometry()
-    spin = column(part(SLIP.symbol, 3))
+    spin = column(part(VELOCITY_ERROR.symbol, 3))
     e_rate, m_rate, size_rate = symbol("e_d", 3), symbol("m_d", 3), symbol("size_d", 1)
     lever_rate = symbol("rho_d", 3)
     shrinking = _scale_vector(size_rate[0, 0] / size[0, 0], m)
@@ -186,7 +189,7 @@ def rolling_drift() -> Derivation:
     return Derivation(
         "loops",
         "rate of the rows of a disc that rolls on a plane",
-        (_DISC, TURN, SLIP),
+        (_DISC, ROTATION, VELOCITY_ERROR),
         (_DRIFT,),
         (
             *equations[:-1],
@@ -205,7 +208,7 @@ def rolling_drift() -> Derivation:
 _FLAT = sp.Rational(1, 10**3)
 #: Singular cases: (condition, failure code, message) by kernel.
 GUARDS: dict[str, tuple[tuple[sp.Basic, int, str], ...]] = {
-    "rolling": ((symbol("size", 1)[0, 0] > _FLAT, 1, "the disc lies flat on its plane"),),
+    "rolling": ((symbol("size", 1)[0, 0] > _FLAT, 1, "the disc lies flat on its plane"),)
 }
 
 #: Kernels of constraints, in their order.

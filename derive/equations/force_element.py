@@ -7,9 +7,9 @@ import sympy as sp
 from ..definition.derivation import Derivation, Equation, Quantity, tilde, vector
 from ..definition.element import ForceElement, Symbols, describe_array
 from ..definition.nonsmooth_functions import slope
-from ..definition.rotation_derivatives import turning_rate
+from ..definition.rotation_derivatives import rotating_derivative
 
-#: Failure code of a force element whose direction is undefined (`defined_when`).
+#: Failure code of a force element whose direction is undefined (`domain`).
 UNDEFINED = 2
 
 
@@ -32,11 +32,7 @@ def relative_motion() -> tuple[tuple[Equation, ...], tuple[sp.MatrixSymbol, ...]
     equations = (
         Equation("relative position, F axes", x, a_f.T * (x_t - x_f)),
         Equation("angular velocity of F, F axes", spin, a_f.T * w_f),
-        Equation(
-            "relative rate, F axes",
-            v,
-            a_f.T * (v_t - v_f) - tilde(_explicit(spin)) * x,
-        ),
+        Equation("relative rate, F axes", v, a_f.T * (v_t - v_f) - tilde(_explicit(spin)) * x),
         Equation("relative rotation", rotation, a_f.T * a_t),
         Equation("relative angular velocity, F axes", w, a_f.T * (w_t - w_f)),
     )
@@ -73,7 +69,7 @@ def wrench(element: ForceElement) -> Derivation:
         Quantity(vector("F", 3), "N", "force on T at its point, inertial axes"),
         Quantity(vector("M", 3), "N*m", "moment on T, inertial axes"),
         Quantity(vector("V", 1), "J", "stored energy"),
-        Quantity(vector("P", 1), "W", "power of what is not stored"),
+        Quantity(vector("P", 1), "W", "power of non-conservative forces"),
     )
     return Derivation(
         element.name,
@@ -128,12 +124,12 @@ def _deflection_equations(
     values = dict(zip(names, x, strict=True))
     of_names = deflection.xreplace(dict(zip(x, names, strict=True)))
     derivatives = [slope(of_names, name).xreplace(values) for name in names]
-    turns = [turning_rate(deflection, rotation, units[:, k]) for k in range(3)]
+    turns = [rotating_derivative(deflection, rotation, units[:, k]) for k in range(3)]
     ways, pushed = sp.MatrixSymbol("E", n, 6), vector("push", n)
     steps = [
         Equation("deflection", vector("bent", n), deflection),
-        Equation("deflection by rates and turns", ways, sp.Matrix.hstack(*derivatives, *turns)),
-        Equation("push along the deflection", pushed, push),
+        Equation("deflection by rates and rotations", ways, sp.Matrix.hstack(*derivatives, *turns)),
+        Equation("force along the deflection", pushed, push),
     ]
     return steps, _explicit(ways).T * _explicit(pushed)
 
@@ -142,7 +138,7 @@ def wrench_guards(element: ForceElement) -> tuple[tuple[sp.Basic, int, str], ...
     """Condition stated by the element, in terms of the arrays of the kernel."""
     p = Symbols("p", tuple(x.name for x in element.parameters))
     _, arrays = relative_motion()
-    condition = element.defined_within(_explicit(arrays[0]), _explicit(arrays[2]), p)
+    condition = element.domain_by_rotation(_explicit(arrays[0]), _explicit(arrays[2]), p)
     if condition is None:
         return ()
     replace = {s: vector("p", len(p))[i, 0] for i, s in enumerate(p)}

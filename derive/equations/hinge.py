@@ -31,7 +31,7 @@ _DIGITS, _SAME = 60, 40
 
 
 @dataclass(frozen=True)
-class HingePlace:
+class HingePose:
     """Relative position of a hinge as SymPy matrices in the symbols q, p."""
 
     hinge: Hinge
@@ -47,7 +47,7 @@ class HingePlace:
 
 
 @dataclass(frozen=True)
-class HingeMotion(HingePlace):
+class HingeMotion(HingePose):
     """Relative motion of a hinge as SymPy matrices in the symbols q, u, p."""
 
     subspace: sp.Matrix
@@ -77,7 +77,7 @@ def speeds_of(hinge: Hinge) -> tuple[Param, ...]:
 
 
 @lru_cache(maxsize=32)
-def place_of(hinge: Hinge) -> HingePlace:
+def hinge_pose(hinge: Hinge) -> HingePose:
     """Rotation and position as defined, without derived quantities."""
     q = Symbols("q", tuple(c.name for c in hinge.coordinates))
     u = Symbols("u", tuple(s.name for s in speeds_of(hinge)))
@@ -85,7 +85,7 @@ def place_of(hinge: Hinge) -> HingePlace:
     location = f"hinge {hinge.name}"
     rotation = stated.matrix(location, "rotation(q, p)", hinge.rotation, (3, 3), q, p)
     position = stated.matrix(location, "position(q, p)", hinge.position, (3, 1), q, p)
-    return HingePlace(hinge, q, u, p, rotation, position)
+    return HingePose(hinge, q, u, p, rotation, position)
 
 
 @lru_cache(maxsize=32)
@@ -94,7 +94,7 @@ def motion_of(hinge: Hinge) -> HingeMotion:
 
     Raises ElementError naming the equation that a definition contradicts.
     """
-    place = place_of(hinge)
+    place = hinge_pose(hinge)
     q, u, p, rotation, position = place.q, place.u, place.p, place.rotation, place.position
     rates = _rates(place)
     subspace = _simplify(_subspace(rotation, position, rates, q, u))
@@ -104,12 +104,12 @@ def motion_of(hinge: Hinge) -> HingeMotion:
     return HingeMotion(hinge, q, u, p, rotation, position, subspace, v, w, bias, rates)
 
 
-def moves_as(hinge: Hinge, subspace: sp.Matrix) -> bool:
+def has_subspace(hinge: Hinge, subspace: sp.Matrix) -> bool:
     """Whether H equals this constant matrix, compared at two positions to forty digits.
 
     The numerical comparison avoids deriving kernels that are only named.
     """
-    place = place_of(hinge)
+    place = hinge_pose(hinge)
     if (6, place.nu) != subspace.shape:
         return False
     subspace_derived = _subspace(place.rotation, place.position, _rates(place), place.q, place.u)
@@ -122,16 +122,18 @@ def moves_as(hinge: Hinge, subspace: sp.Matrix) -> bool:
     return True
 
 
-def _rates(place: HingePlace) -> sp.Matrix:
+def _rates(place: HingePose) -> sp.Matrix:
     hinge, q, u, location = place.hinge, place.q, place.u, f"hinge {place.hinge.name}"
-    rates = stated.optional(location, "rates(q, u, p)", hinge.rates, q, u, place.p)
+    rates = stated.optional(
+        location, "coordinate_rates(q, u, p)", hinge.coordinate_rates, q, u, place.p
+    )
     if rates is None and len(q) != len(u):
         raise ElementError(
             f"{location}: {len(q)} coordinates but {len(u)} speeds; "
             "state qdot = N(q) u in rates(q, u, p)"
         )
     given = sp.Matrix(list(u)) if rates is None else rates
-    return stated.matrix(location, "rates(q, u, p)", lambda: given, (len(q), 1))
+    return stated.matrix(location, "coordinate_rates(q, u, p)", lambda: given, (len(q), 1))
 
 
 def _subspace(

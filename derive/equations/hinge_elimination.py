@@ -19,8 +19,8 @@ from ..definition.derivation import Derivation, Equation, Quantity, Solve
 from .block_matrices import column, diagonal, symbol
 from .riccati_sweep import SOURCES, E, S, free_speeds, gains, replace_rows, unit_directions
 
-REDUCED_S = Quantity(symbol("S_Q", 6, 6), "", "S behind the hinge, hinge axes", symmetric=True)
-REDUCED_E = Quantity(symbol("e_Q", 6), "N, N*m", "e behind the hinge, hinge axes")
+REDUCED_S = Quantity(symbol("S_Q", 6, 6), "", "S outboard of the hinge, hinge axes", symmetric=True)
+REDUCED_E = Quantity(symbol("e_Q", 6), "N, N*m", "e outboard of the hinge, hinge axes")
 
 
 def eliminate(

@@ -6,7 +6,7 @@ import sympy as sp
 
 from ..definition.derivation import Derivation, Equation, Quantity, tilde, vector
 from .block_matrices import column, part, stack, symbol
-from .riccati_sweep import FLOOR, MOTION, SHIFT, E, R, floor_of
+from .riccati_sweep import FLOOR, MOTION, SHIFT, E, R, inertia_floor
 
 A_PARENT = Quantity(symbol("A_I", 3, 3), "", "rotation, parent axes to inertial axes")
 X_PARENT = Quantity(symbol("x_I", 3), "m", "P of the parent, inertial axes")
@@ -89,7 +89,7 @@ def turning() -> Derivation:
     motion = MOTION.symbol
     return Derivation(
         "frames",
-        "turning of a body",
+        "rotation of a body",
         (A, MOTION, delta),
         (
             Quantity(rate, "rad/s", "angular velocity, inertial axes"),
@@ -98,9 +98,7 @@ def turning() -> Derivation:
         (
             Equation("angular velocity", rate, A.symbol * part(motion, 0)),
             Equation(
-                "angular acceleration",
-                second,
-                A.symbol * (part(motion, 3) + part(delta.symbol, 3)),
+                "angular acceleration", second, A.symbol * (part(motion, 3) + part(delta.symbol, 3))
             ),
         ),
     )
@@ -149,13 +147,7 @@ def power() -> Derivation:
             Quantity(w_k, "rad/s", "angular velocity, inertial axes"),
         ),
         (Quantity(total, "W", "power"),),
-        (
-            Equation(
-                "power",
-                total,
-                v_k.T * (axes * force) + w_k.T * (axes * moment),
-            ),
-        ),
+        (Equation("power", total, v_k.T * (axes * force) + w_k.T * (axes * moment)),),
     )
 
 
@@ -216,7 +208,7 @@ def pivot_floor() -> Derivation:
         "least inertia that is not rounding",
         (mass_matrix,),
         (FLOOR,),
-        (Equation("share of the mean inertia", FLOOR.symbol, floor_of(mass_matrix.symbol)),),
+        (Equation("share of the mean inertia", FLOOR.symbol, inertia_floor(mass_matrix.symbol)),),
     )
 
 
@@ -325,10 +317,7 @@ def transport() -> Derivation:
             Equation(
                 "X^T e",
                 load.symbol,
-                stack(
-                    push,
-                    R.symbol * part(E.symbol, 3) + tilde(column(SHIFT.symbol)) * push,
-                ),
+                stack(push, R.symbol * part(E.symbol, 3) + tilde(column(SHIFT.symbol)) * push),
             ),
         ),
     )
@@ -353,14 +342,14 @@ def driven_effort() -> Derivation:
     )
     return Derivation(
         "frames",
-        "effort that a prescribed acceleration needs",
+        "effort required by a prescribed acceleration",
         (
             Quantity(load, "N, N*m", "effort along the speed of the load at P, H^T f"),
             Quantity(inertia, "kg or kg*m2", "rotor inertia reflected to the speed"),
             Quantity(rate, "", "acceleration"),
-            Quantity(stated, "N, N*m", "effort that is there already"),
+            Quantity(stated, "N, N*m", "effort already applied"),
         ),
-        (Quantity(effort, "N, N*m", "what is missing"),),
+        (Quantity(effort, "N, N*m", "missing effort"),),
         (Equation("tau_d", effort, load + inertia * rate - stated),),
     )
 

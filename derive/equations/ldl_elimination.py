@@ -118,14 +118,12 @@ def recover_factored(nu: int) -> Derivation:
         Equation("v", v, Triangular(factor.symbol, right_side, transposed=True)),
         Equation("udot = v - W X delta_I", rates.symbol, v - along_units),
         Equation(
-            "deviation of the body",
-            DELTA.symbol,
-            (carried - h.symbol * along_units) + h.symbol * v,
+            "deviation of the body", DELTA.symbol, (carried - h.symbol * along_units) + h.symbol * v
         ),
     )
     return Derivation(
         f"generic{nu}",
-        f"accelerations recovered behind a factored hinge with {free_speeds(nu)}",
+        f"accelerations recovered outboard of a factored hinge with {free_speeds(nu)}",
         (R, SHIFT, h, factor, gain, offset, through, PARENT_DELTA),
         (rates, DELTA),
         equations,

@@ -45,15 +45,17 @@ SOURCES = (
 #: Least value of 1 + trace of a rotation, which vanishes for half a turn.
 _HALF_TURN = sp.Rational(1, 10**12)
 
-TURN = Quantity(symbol("R_C", 3, 3), "", "rotation, axes of C to axes of B")
-END = Quantity(symbol("r_e", 3), "m", "the end of B that the hinge holds, from P, axes of B")
+ROTATION = Quantity(symbol("R_C", 3, 3), "", "rotation, axes of C to axes of B")
+END = Quantity(symbol("r_e", 3), "m", "end of B at the hinge, from P, axes of B")
 LEVER = Quantity(symbol("r_A", 3), "m", "the end of B from P of A, axes of A")
-APART = Quantity(symbol("d", 3), "m", "that end from the origin of C, axes of C")
-SLIP = Quantity(symbol("slip", 6), "", "rate of d and relative angular velocity, axes of C")
+OFFSET = Quantity(symbol("d", 3), "m", "that end from the origin of C, axes of C")
+VELOCITY_ERROR = Quantity(
+    symbol("slip", 6), "", "rate of d and relative angular velocity, axes of C"
+)
 RELATIVE = Quantity(symbol("relative", 6), "", "motion of the end of B relative to C")
 INBOARD_ROW = Quantity(symbol("J_A", 6), "", "row by the acceleration of A, at its P")
 OUTBOARD_ROW = Quantity(symbol("J_B", 6), "", "row by the acceleration of B, at its P")
-BIAS = Quantity(symbol("l", 6), "", "rows of what is known")
+BIAS = Quantity(symbol("l", 6), "", "known parts of the rows")
 
 
 def meet() -> Derivation:
@@ -62,7 +64,7 @@ def meet() -> Derivation:
     a_b, x_b = symbol("A_B", 3, 3), symbol("x_B", 3)
     return Derivation(
         "loops",
-        "the two sides of a hinge that closes a loop",
+        "the two sides of a cut hinge",
         (
             Quantity(a_c, "", "rotation, axes of C to inertial axes"),
             Quantity(x_c, "m", "origin of C, inertial axes"),
@@ -70,11 +72,11 @@ def meet() -> Derivation:
             Quantity(x_b, "m", "P of B, inertial axes"),
             END, R, SHIFT,
         ),
-        (TURN, LEVER, APART),
+        (ROTATION, LEVER, OFFSET),
         (
-            Equation("rotation from C to B", TURN.symbol, a_b.T * a_c),
-            Equation("d", APART.symbol, a_c.T * (x_b - x_c + a_b * END.symbol)),
-            Equation("end from P of A", LEVER.symbol, SHIFT.symbol + R.symbol * APART.symbol),
+            Equation("rotation from C to B", ROTATION.symbol, a_b.T * a_c),
+            Equation("d", OFFSET.symbol, a_c.T * (x_b - x_c + a_b * END.symbol)),
+            Equation("end from P of A", LEVER.symbol, SHIFT.symbol + R.symbol * OFFSET.symbol),
         ),
         sources=SOURCES,
     )  # fmt: skip
@@ -87,14 +89,18 @@ def gap() -> Derivation:
     half = sp.sqrt(sp.Max(1 + trace, _HALF_TURN))
     angle_error = sp.ImmutableDenseMatrix([2 * entry / half for entry in axial(relative)])
     return Derivation(
-        "loops",
-        "gap of a hinge that closes a loop",
-        (Quantity(closed_axes, "", "rotation, axes of C to axes of B where the loop is closed"),
-         TURN, APART),
-        (Quantity(error, "m, rad", "gap, axes of C"),),
+        "loops", "position gap of a cut hinge",
         (
-            Equation("rotation of the end of B against C", relative, TURN.symbol.T * closed_axes),
-            Equation("gap", error, stack(column(APART.symbol), angle_error)),
+            Quantity(closed_axes, "", "rotation, axes of C to axes of B where the loop is closed"),
+            ROTATION,
+            OFFSET,
+        ),
+        (Quantity(error, "m, rad", "position gap, axes of C"),),
+        (
+            Equation(
+                "rotation of the end of B relative to C", relative, ROTATION.symbol.T * closed_axes
+            ),
+            Equation("gap", error, stack(column(OFFSET.symbol), angle_error)),
         ),
         sources=SOURCES,
     )  # fmt: skip
@@ -104,20 +110,20 @@ def slip() -> Derivation:
     """Velocity of the end of B relative to C."""
     v_c, w_c, v_b, w_b = (symbol(name, 3) for name in ("v_C", "w_C", "v_B", "w_B"))
     end = v_b + tilde(column(w_b)) * END.symbol
-    linear = TURN.symbol.T * end - v_c - tilde(column(w_c)) * APART.symbol
-    angular = TURN.symbol.T * w_b - w_c
+    linear = ROTATION.symbol.T * end - v_c - tilde(column(w_c)) * OFFSET.symbol
+    angular = ROTATION.symbol.T * w_b - w_c
     return Derivation(
         "loops",
-        "slip of a hinge that closes a loop",
+        "velocity error of a cut hinge",
         (
-            TURN, END, APART,
+            ROTATION, END, OFFSET,
             Quantity(v_c, "m/s", "velocity of C, own axes"),
             Quantity(w_c, "rad/s", "angular velocity of C, own axes"),
             Quantity(v_b, "m/s", "velocity of P of B, own axes"),
             Quantity(w_b, "rad/s", "angular velocity of B, own axes"),
         ),
-        (SLIP,),
-        (Equation("slip", SLIP.symbol, stack(linear, angular)),),
+        (VELOCITY_ERROR,),
+        (Equation("slip", VELOCITY_ERROR.symbol, stack(linear, angular)),),
         sources=SOURCES,
     )  # fmt: skip
 
@@ -128,17 +134,19 @@ def drift() -> Derivation:
         Quantity(symbol(f"motion_{name}", 9), "", f"bias motion of {name}: w, wd, rdd, own axes")
         for name in "CB"
     )
-    result = Quantity(symbol("drift", 6), "", "rate of the slip in the bias motion, axes of C")
+    result = Quantity(
+        symbol("drift", 6), "", "rate of the velocity error in the bias motion, axes of C"
+    )
     w_c, wd_c, rdd_c = (part(of_c.symbol, k) for k in (0, 3, 6))
     w_b, wd_b, rdd_b = (part(of_b.symbol, k) for k in (0, 3, 6))
     end = rdd_b + tilde(wd_b) * END.symbol + tilde(w_b) * (tilde(w_b) * END.symbol)
-    carried = rdd_c + tilde(wd_c) * APART.symbol + tilde(w_c) * (tilde(w_c) * APART.symbol)
-    linear = TURN.symbol.T * end - carried - 2 * (tilde(w_c) * part(SLIP.symbol, 0))
-    angular = TURN.symbol.T * wd_b - wd_c - tilde(w_c) * part(SLIP.symbol, 3)
+    carried = rdd_c + tilde(wd_c) * OFFSET.symbol + tilde(w_c) * (tilde(w_c) * OFFSET.symbol)
+    linear = ROTATION.symbol.T * end - carried - 2 * (tilde(w_c) * part(VELOCITY_ERROR.symbol, 0))
+    angular = ROTATION.symbol.T * wd_b - wd_c - tilde(w_c) * part(VELOCITY_ERROR.symbol, 3)
     return Derivation(
         "loops",
-        "drift of a hinge that closes a loop",
-        (TURN, END, APART, SLIP, of_c, of_b),
+        "drift of a cut hinge",
+        (ROTATION, END, OFFSET, VELOCITY_ERROR, of_c, of_b),
         (result,),
         (Equation("drift", result.symbol, stack(linear, angular)),),
         sources=SOURCES,
@@ -151,12 +159,12 @@ def closing() -> Derivation:
     1 / rate converts accelerations to changes of coordinates (M. Arnold, O. Brüls, Multibody
     Syst. Dyn. 18 (2007) 185-202).
     """
-    gap = Quantity(symbol("gap", 6), "", "gap, axes of C")
+    gap = Quantity(symbol("gap", 6), "", "position gap, axes of C")
     rate = Quantity(symbol("rate", 1), "1/s^2", "accelerations by changes of coordinates")
     value = _scale_vector(rate.symbol[0, 0], gap.symbol)
     return Derivation(
         "loops",
-        "accelerations that close a gap in a step",
+        "accelerations that remove a position gap in a step",
         (gap, rate),
         (RELATIVE,),
         (Equation("rate gap", RELATIVE.symbol, value),),
@@ -173,12 +181,12 @@ def row() -> Derivation:
     direction = Quantity(symbol("w", 6), "", "the direction: a row of W")
     force = sp.ImmutableDenseMatrix([direction.symbol[i, 0] for i in range(3)])
     moment = sp.ImmutableDenseMatrix([direction.symbol[i, 0] for i in range(3, 6)])
-    outboard = _carried_load(TURN.symbol, END.symbol, force, moment)
+    outboard = _carried_load(ROTATION.symbol, END.symbol, force, moment)
     inboard = _carried_load(R.symbol, LEVER.symbol, -force, -moment)
     return Derivation(
         "loops",
-        "row of a direction of a hinge that closes a loop",
-        (direction, TURN, END, R, LEVER),
+        "row of a direction of a cut hinge",
+        (direction, ROTATION, END, R, LEVER),
         (INBOARD_ROW, OUTBOARD_ROW),
         (
             Equation("J_A", INBOARD_ROW.symbol, sp.ImmutableDenseMatrix(inboard)),
@@ -192,7 +200,7 @@ def known() -> Derivation:
     """Known parts of all six directions."""
     return Derivation(
         "loops",
-        "known parts of the rows of a hinge that closes a loop",
+        "known parts of the rows of a cut hinge",
         (DIRECTIONS, RELATIVE),
         (BIAS,),
         (Equation("l", BIAS.symbol, DIRECTIONS.symbol * RELATIVE.symbol),),
@@ -218,12 +226,12 @@ def told() -> Derivation:
         Quantity(symbol(f"delta_{name}", 6), "", f"deviation of the acceleration of {name}")
         for name in "AB"
     )
-    of_row = Quantity(symbol("l", 1), "", "row of what is known")
+    of_row = Quantity(symbol("l", 1), "", "known part of the row")
     result = Quantity(symbol("c", 1), "", "acceleration along the direction")
     value = of_row.symbol + INBOARD_ROW.symbol.T * of_a.symbol + OUTBOARD_ROW.symbol.T * of_b.symbol
     return Derivation(
         "loops",
-        "acceleration along a direction of a hinge that closes a loop",
+        "acceleration along a direction of a cut hinge",
         (INBOARD_ROW, OUTBOARD_ROW, of_row, of_a, of_b),
         (result,),
         (Equation("c", result.symbol, value),),
@@ -233,7 +241,7 @@ def told() -> Derivation:
 
 def act() -> Derivation:
     """e -= J tau: load of an effort on a body."""
-    direction = Quantity(symbol("J", 6), "", "load of an effort of one")
+    direction = Quantity(symbol("J", 6), "", "load of a unit effort")
     effort = Quantity(symbol("tau", 1), "N, N*m", "effort")
     load = Quantity(symbol("e", 6), "N, N*m", "force part of f = S a + e", accumulate=True)
     value = sp.ImmutableDenseMatrix(
@@ -247,15 +255,15 @@ def act() -> Derivation:
 
 # --- multipliers through the sweep ----------------------------------------------------------------
 
-COLUMN = Quantity(symbol("K", 6), "", "column of the row, at P of the body that it is seen from")
-KNOWN = Quantity(symbol("l", 1), "", "what of the row does not go by multipliers or motion")
+COLUMN = Quantity(symbol("K", 6), "", "column of the row, at P of its current body")
+KNOWN_PART = Quantity(symbol("l", 1), "", "part of the row independent of multipliers and motion")
 PIVOT = Quantity(symbol("L", 1), "", "the row's own entry of L")
-INVERSE = Quantity(symbol("inverse", 1), "", "1 / L_rr, zero where nothing moves the row")
-COUPLING = Quantity(symbol("L_p", 1), "", "entry of L of the row that closes and another")
+INVERSE = Quantity(symbol("inverse", 1), "", "1 / L_rr, zero where no motion affects the row")
+COUPLING = Quantity(symbol("L_p", 1), "", "entry of L of the eliminated row and another")
 MULTIPLIER = Quantity(symbol("x", 1), "N, N*m", "multiplier")
 
 
-def _accumulated(name: str, rows: int = 1, meaning: str = "") -> Quantity:
+def _accumulating(name: str, rows: int = 1, meaning: str = "") -> Quantity:
     return Quantity(symbol(name, rows), "", meaning, accumulate=True)
 
 
@@ -269,7 +277,7 @@ def settle() -> Derivation:
     pivot = PIVOT.symbol[0, 0]
     reciprocal = sp.Piecewise((1 / pivot, pivot > floor.symbol[0, 0]), (0, True))
     return Derivation(
-        "loops", "pivot of a row that closes", (PIVOT, floor), (INVERSE,),
+        "loops", "pivot of an eliminated row", (PIVOT, floor), (INVERSE,),
         (Equation("1 / L_rr", INVERSE.symbol, sp.ImmutableDenseMatrix([reciprocal])),),
         sources=SOURCES,
     )  # fmt: skip
@@ -278,17 +286,19 @@ def settle() -> Derivation:
 def close() -> Derivation:
     """Close row r on the body where its ends meet."""
     mass = Quantity(symbol("S", 6, 6), "", "S of the body", symmetric=True, accumulate=True)
-    load = _accumulated("e", 6, "e of the body")
+    load = _accumulating("e", 6, "e of the body")
     k, inverse, scaled = COLUMN.symbol, INVERSE.symbol[0, 0], symbol("K_d", 6)
     return Derivation(
         "loops",
-        "a row closed where its ends meet",
-        (INVERSE, COLUMN, KNOWN),
+        "a row eliminated where its ends meet",
+        (INVERSE, COLUMN, KNOWN_PART),
         (mass, load),
         (
             Equation("K_r / L_rr", scaled, _scale_vector(inverse, k)),
             Equation("S += K_r K_r^T / L_rr", mass.symbol, scaled * k.T, symmetric=True),
-            Equation("e += K_r l_r / L_rr", load.symbol, _scale_vector(KNOWN.symbol[0, 0], scaled)),
+            Equation(
+                "e += K_r l_r / L_rr", load.symbol, _scale_vector(KNOWN_PART.symbol[0, 0], scaled)
+            ),
         ),
         sources=SOURCES,
     )
@@ -300,10 +310,10 @@ def _scale_vector(factor: sp.Expr, vector: sp.MatrixSymbol) -> sp.ImmutableDense
 
 def shed() -> Derivation:
     """Column of an open row p after row r is closed."""
-    column_p = _accumulated("K_p", 6, "column of row p")
+    column_p = _accumulating("K_p", 6, "column of row p")
     share = -INVERSE.symbol[0, 0] * COUPLING.symbol[0, 0]
     return Derivation(
-        "loops", "column of a row that stays while another is closed",
+        "loops", "column of a remaining row while another is eliminated",
         (INVERSE, COLUMN, COUPLING), (column_p,),
         (Equation("K_p -= K_r L_rp / L_rr", column_p.symbol, _scale_vector(share, COLUMN.symbol)),),
         sources=SOURCES,
@@ -312,11 +322,11 @@ def shed() -> Derivation:
 
 def shed_known() -> Derivation:
     """Known part of an open row p after row r is closed."""
-    known_p = _accumulated("l_p", 1, "known part of row p")
-    value = -INVERSE.symbol[0, 0] * COUPLING.symbol[0, 0] * KNOWN.symbol[0, 0]
+    known_p = _accumulating("l_p", 1, "known part of row p")
+    value = -INVERSE.symbol[0, 0] * COUPLING.symbol[0, 0] * KNOWN_PART.symbol[0, 0]
     return Derivation(
-        "loops", "known part of a row that stays while another is closed",
-        (INVERSE, KNOWN, COUPLING), (known_p,),
+        "loops", "known part of a remaining row while another is eliminated",
+        (INVERSE, KNOWN_PART, COUPLING), (known_p,),
         (Equation("l_p -= l_r L_rp / L_rr", known_p.symbol, sp.ImmutableDenseMatrix([value])),),
         sources=SOURCES,
     )  # fmt: skip
@@ -324,11 +334,11 @@ def shed_known() -> Derivation:
 
 def shed_pair() -> Derivation:
     """Entry of L of two open rows after row r is closed."""
-    second = Quantity(symbol("L_q", 1), "", "entry of L of the row that closes and the second")
-    entry = _accumulated("L_pq", 1, "entry of L of both")
+    second = Quantity(symbol("L_q", 1), "", "entry of L of the eliminated row and the second")
+    entry = _accumulating("L_pq", 1, "entry of L of both")
     value = -INVERSE.symbol[0, 0] * COUPLING.symbol[0, 0] * second.symbol[0, 0]
     return Derivation(
-        "loops", "two rows that stay while another is closed", (INVERSE, COUPLING, second),
+        "loops", "two remaining rows while another is eliminated", (INVERSE, COUPLING, second),
         (entry,),
         (Equation("L_pq -= L_rp L_rq / L_rr", entry.symbol, sp.ImmutableDenseMatrix([value])),),
         sources=SOURCES,
@@ -338,17 +348,17 @@ def shed_pair() -> Derivation:
 def multiplier() -> Derivation:
     """x_r at the ground, whose deviation is zero, without the rows that were open then."""
     return Derivation(
-        "loops", "multiplier of a row", (INVERSE, KNOWN), (MULTIPLIER,),
-        (Equation("x_r", MULTIPLIER.symbol, INVERSE.symbol * KNOWN.symbol),), sources=SOURCES,
+        "loops", "multiplier of a row", (INVERSE, KNOWN_PART), (MULTIPLIER,),
+        (Equation("x_r", MULTIPLIER.symbol, INVERSE.symbol * KNOWN_PART.symbol),), sources=SOURCES,
     )  # fmt: skip
 
 
 def multiplier_more() -> Derivation:
     """Contribution of the body where the row closes."""
     delta = Quantity(symbol("delta", 6), "", "deviation of the acceleration of the body")
-    result = _accumulated("x", 1, "multiplier of row r")
+    result = _accumulating("x", 1, "multiplier of row r")
     return Derivation(
-        "loops", "share of a motion in a multiplier", (INVERSE, COLUMN, delta), (result,),
+        "loops", "contribution of a motion to a multiplier", (INVERSE, COLUMN, delta), (result,),
         (Equation(
             "x_r += K_r^T a / L_rr", result.symbol,
             INVERSE.symbol * (COLUMN.symbol.T * delta.symbol),
@@ -360,10 +370,10 @@ def multiplier_more() -> Derivation:
 def multiplier_less() -> Derivation:
     """Contribution of a row p that was open then."""
     multiplier_p = Quantity(symbol("x_p", 1), "N, N*m", "multiplier of row p")
-    result = _accumulated("x", 1, "multiplier of row r")
+    result = _accumulating("x", 1, "multiplier of row r")
     value = -INVERSE.symbol[0, 0] * COUPLING.symbol[0, 0] * multiplier_p.symbol[0, 0]
     return Derivation(
-        "loops", "share of another row in a multiplier", (INVERSE, COUPLING, multiplier_p),
+        "loops", "contribution of another row to a multiplier", (INVERSE, COUPLING, multiplier_p),
         (result,),
         (Equation("x_r -= L_rp x_p / L_rr", result.symbol, sp.ImmutableDenseMatrix([value])),),
         sources=SOURCES,
@@ -373,8 +383,8 @@ def multiplier_less() -> Derivation:
 def yielded() -> Derivation:
     """l += s - x / J: residual of a rotor's row s = x / J at known s and x."""
     soft = Quantity(symbol("softness", 1), "", "1 / J of the rotor on the row")
-    acceleration = Quantity(symbol("s", 1), "", "acceleration of the speed that it turns with")
-    known = _accumulated("l", 1, "known part of the row")
+    acceleration = Quantity(symbol("s", 1), "", "acceleration of its speed")
+    known = _accumulating("l", 1, "known part of the row")
     value = acceleration.symbol[0, 0] - soft.symbol[0, 0] * MULTIPLIER.symbol[0, 0]
     return Derivation(
         "loops", "the row of a rotor with a multiplier", (soft, acceleration, MULTIPLIER), (known,),
@@ -385,7 +395,7 @@ def yielded() -> Derivation:
 
 def loaded() -> Derivation:
     """e += K x: load of known multipliers."""
-    load = _accumulated("e", 6, "e of the body")
+    load = _accumulating("e", 6, "e of the body")
     return Derivation(
         "loops", "load of a multiplier", (COLUMN, MULTIPLIER), (load,),
         (Equation("e += K x", load.symbol, _scale_vector(MULTIPLIER.symbol[0, 0], COLUMN.symbol)),),
@@ -424,7 +434,7 @@ def divide(nu: int) -> Derivation:
 def couple(nu: int) -> Derivation:
     """L_ij += y_i . z_j."""
     y, z = _speed_quantity("y", nu, "of one row"), _speed_quantity("z", nu, "of the other")
-    entry = _accumulated("L_ij", 1, "entry of L of both")
+    entry = _accumulating("L_ij", 1, "entry of L of both")
     return Derivation(
         f"generic{nu}", f"two columns coupled by a hinge with {nu} speeds", (y, z), (entry,),
         (Equation("L_ij += y_i . z_j", entry.symbol, y.symbol.T * z.symbol),), sources=SOURCES,
@@ -434,9 +444,9 @@ def couple(nu: int) -> Derivation:
 def answered(nu: int) -> Derivation:
     """l_j -= z_j . (tau - H^T e)."""
     y, z = _speed_quantity("y", nu, "tau - H^T e"), _speed_quantity("z", nu, "of the row")
-    known = _accumulated("l", 1, "known part of the row")
+    known = _accumulating("l", 1, "known part of the row")
     return Derivation(
-        f"generic{nu}", f"what a hinge with {nu} speeds tells a row", (y, z), (known,),
+        f"generic{nu}", f"contribution of a hinge with {nu} speeds to a row", (y, z), (known,),
         (Equation("l_j -= z_j . y", known.symbol, -(y.symbol.T * z.symbol)),), sources=SOURCES,
     )  # fmt: skip
 
@@ -444,9 +454,10 @@ def answered(nu: int) -> Derivation:
 def pull(nu: int) -> Derivation:
     """tau - H^T e with the multiplier of a row: udot = D^-1 (y_0 + sum y_j x_j) - G a."""
     y = _speed_quantity("y", nu, "of the row")
-    total = _accumulated("y_0", nu, "tau - H^T e")
+    total = _accumulating("y_0", nu, "tau - H^T e")
     return Derivation(
-        f"generic{nu}", f"a multiplier felt by a hinge with {nu} speeds", (y, MULTIPLIER), (total,),
+        f"generic{nu}", f"contribution of a multiplier to a hinge with {nu} speeds",
+        (y, MULTIPLIER), (total,),
         (Equation(
             "y_0 += y_j x_j", total.symbol, _scale_vector(MULTIPLIER.symbol[0, 0], y.symbol)
         ),),

@@ -88,7 +88,7 @@ def general() -> MassDistribution:
     )
 
 
-def of_tensor(mass: sp.Expr, center: Matrix, inertia: Matrix) -> MassDistribution:
+def from_inertia_tensor(mass: sp.Expr, center: Matrix, inertia: Matrix) -> MassDistribution:
     """Distribution with this mass, mass centre and symmetric inertia tensor about the origin."""
     return MassDistribution(
         mass,
@@ -105,4 +105,4 @@ def point_masses(masses: list[sp.Expr], positions: list[Matrix]) -> MassDistribu
     inertia = sp.zeros(3, 3)
     for m, p in zip(masses, positions, strict=True):
         inertia -= m * tilde(p) * tilde(p)
-    return of_tensor(total, Matrix(center), Matrix(inertia))
+    return from_inertia_tensor(total, Matrix(center), Matrix(inertia))

@@ -50,7 +50,7 @@ def factor(nu: int) -> Derivation:
     """
     h, factored, gain, _ = _hinge(nu)
     rotor = Quantity(symbol("J", nu), "kg*m2 or kg", "rotor inertia reflected to the speeds")
-    laws = Quantity(symbol("W", nu, nu), "", "change of the efforts of laws, a row a speed")
+    laws = Quantity(symbol("W", nu, nu), "", "change of the efforts of laws, one row per speed")
     push, pivot, below = symbol("U", 6, nu), symbol("D", nu, nu), symbol("Y", nu, 6)
     scaled, reduced = symbol("Z", nu, 6), symbol("S_Q", 6, 6)
     equations: tuple[Equation, ...] = (Equation("S_Q = S", reduced, S.symbol),)
@@ -72,10 +72,7 @@ def factor(nu: int) -> Derivation:
                 Triangular(factored.symbol, scaled, transposed=True),
             ),
             Equation(
-                "S_Q = S - Y^T diag(d)^-1 Y",
-                reduced,
-                S.symbol - below.T * scaled,
-                symmetric=True,
+                "S_Q = S - Y^T diag(d)^-1 Y", reduced, S.symbol - below.T * scaled, symmetric=True
             ),
         )
     steps, transported = congruence("S_Q")
@@ -98,10 +95,12 @@ def _symmetric(matrix: sp.MatrixSymbol) -> sp.ImmutableDenseMatrix:
     )  # fmt: skip
 
 
-def push(nu: int) -> Derivation:
+def column_load(nu: int) -> Derivation:
     """Load of one column carried to the parent."""
     h, _, gain, surplus = _hinge(nu)
-    tau = Quantity(symbol("tau", nu), "N, N*m", "the column's efforts on the free coordinates")
+    tau = Quantity(
+        symbol("tau", nu), "N, N*m", "efforts of the right-hand side on the free coordinates"
+    )
     onward = symbol("e_Q", 6)
     equations: tuple[Equation, ...] = (Equation("e_Q = e", onward, E.symbol),)
     if nu:
@@ -111,7 +110,7 @@ def push(nu: int) -> Derivation:
         )
     return Derivation(
         f"generic{nu}",
-        f"load of a column carried across a hinge with {free_speeds(nu)}",
+        f"load of a right-hand side carried across a hinge with {free_speeds(nu)}",
         (R, SHIFT, h, gain, E, tau),
         (surplus, PARENT_E),
         (*equations, Equation("X^T e_Q", PARENT_E.symbol, transport(onward))),
@@ -119,20 +118,22 @@ def push(nu: int) -> Derivation:
     )
 
 
-def push_on_ground(nu: int) -> Derivation:
+def ground_column_load(nu: int) -> Derivation:
     """y of one column at a hinge on the ground."""
     h, _, _, surplus = _hinge(nu)
-    tau = Quantity(symbol("tau", nu), "N, N*m", "the column's efforts on the free coordinates")
+    tau = Quantity(
+        symbol("tau", nu), "N, N*m", "efforts of the right-hand side on the free coordinates"
+    )
     value = tau.symbol - h.symbol.T * E.symbol
     return Derivation(
         f"generic{nu}",
-        f"load of a column felt by a hinge on the ground with {free_speeds(nu)}",
+        f"load of a right-hand side along a hinge on the ground with {free_speeds(nu)}",
         (h, E, tau), (surplus,),
         (Equation("y = tau - H^T e", surplus.symbol, value),), sources=SOURCES,
     )  # fmt: skip
 
 
-def answer(nu: int) -> Derivation:
+def column_acceleration(nu: int) -> Derivation:
     """udot = D^-1 y - G X delta_I and the deviation X delta_I + H udot of the body."""
     h, factor, gain, surplus = _hinge(nu)
     rates = Quantity(symbol("udot", nu), "", "accelerations of the free coordinates")
@@ -153,7 +154,7 @@ def answer(nu: int) -> Derivation:
         equations.append(Equation("deviation of the body", DELTA.symbol, carried))
     return Derivation(
         f"generic{nu}",
-        f"accelerations that answer a column, across a hinge with {free_speeds(nu)}",
+        f"accelerations due to a right-hand side, across a hinge with {free_speeds(nu)}",
         (R, SHIFT, h, factor, gain, surplus, PARENT_DELTA),
         (rates, DELTA),
         tuple(equations),

@@ -8,7 +8,7 @@ agree identically.
 
 Vectors are 3 x 1 columns of components in body axes unless a name says otherwise; SI units.  Source
 for comparison: Jing and Stephansson, Fundamentals of Discrete Element Methods for Rock Engineering,
-Elsevier 2007, ch. 2, (2.18) to (2.36); `tests/book_formulas` compares.
+Elsevier 2007, ch. 2, (2.18) to (2.36); `tests/derive/equations/test_newton_euler.py` compares.
 """
 
 from __future__ import annotations
@@ -34,11 +34,7 @@ def component_rate(v: Matrix) -> Matrix:
     Points are fixed in body axes; the components of X0 and V0 change because the origin moves and
     because the axes turn under it.
     """
-    rates = {
-        X0: V0 - tilde(OMEGA) * X0,
-        V0: A0 - tilde(OMEGA) * V0,
-        OMEGA: OMEGADOT,
-    }
+    rates = {X0: V0 - tilde(OMEGA) * X0, V0: A0 - tilde(OMEGA) * V0, OMEGA: OMEGADOT}
     total = sp.zeros(*v.shape)
     for quantity, rate in rates.items():
         total += Matrix(v.jacobian(quantity)) * rate

@@ -54,13 +54,13 @@ SOURCES_QR = (
 )
 
 ROWS = Quantity(symbol("U", 21), "", "upper triangle, row by row: S = U^T U")
-TAKEN = Quantity(symbol("d", 6), "", "load that rows take: f = U^T (U a + d) + e")
-ONWARD = Quantity(symbol("V", 21), "", "upper triangle of what is behind the hinge")
-ONWARD_TAKEN = Quantity(symbol("d_V", 6), "", "load that its rows take")
-REST = Quantity(symbol("e_Q", 6), "N, N*m", "load that they do not take")
+ROW_LOAD = Quantity(symbol("d", 6), "", "load in the rows: f = U^T (U a + d) + e")
+CARRIED_ROWS = Quantity(symbol("V", 21), "", "upper triangle outboard of the hinge")
+CARRIED_ROW_LOAD = Quantity(symbol("d_V", 6), "", "load in its rows")
+REMAINING_LOAD = Quantity(symbol("e_Q", 6), "N, N*m", "load outside the rows")
 
 PARENT_ROWS = Quantity(symbol("U_P", 21), "", "upper triangle of the parent so far")
-PARENT_TAKEN = Quantity(symbol("d_P", 6), "", "load that its rows take")
+PARENT_ROW_LOAD = Quantity(symbol("d_P", 6), "", "load in its rows")
 
 
 def triangular(entries: sp.MatrixSymbol) -> sp.ImmutableDenseMatrix:
@@ -106,7 +106,7 @@ def factor() -> Derivation:
     matrix = sp.ImmutableDenseMatrix(entries)
     equations.append(Equation("U", ROWS.symbol, _triangle_entries(matrix)))
     return Derivation(
-        "qr", "rows of a body alone", (S,), (ROWS,), tuple(equations), sources=SOURCES_QR
+        "qr", "rows of a single body", (S,), (ROWS,), tuple(equations), sources=SOURCES_QR
     )
 
 
@@ -126,13 +126,13 @@ def bias() -> Derivation:
     spin = tilde(w)
     return Derivation(
         "qr",
-        "loads of a rigid body alone by its rows",
+        "loads of a single rigid body by its rows",
         (ROWS, MOTION),
-        (TAKEN, E),
+        (ROW_LOAD, E),
         (
             Equation("bias acceleration", accelerations, stack(rdd, wd)),
             Equation("w x (w x r_C) sqrt(m)", turning, stack(spin * (spin * arm), sp.zeros(3, 1))),
-            Equation("d", TAKEN.symbol, u * accelerations + turning),
+            Equation("d", ROW_LOAD.symbol, u * accelerations + turning),
             Equation("rows of J_C", inertia_rows, inner),
             Equation("J_C w", spun, inertia_rows.T * (inertia_rows * w)),
             Equation("w x J_C w", E.symbol, stack(sp.zeros(3, 1), spin * spun)),
@@ -149,26 +149,28 @@ def _split_load() -> tuple[tuple[Equation, ...], sp.MatrixSymbol, sp.MatrixSymbo
     for i in range(6):
         remainder_i, equation = _scalar_equation(
             f"left_{i + 1}", E.symbol[i, 0] - sum(u[k, i] * carried[k] for k in range(i)),
-            f"load left for row {i + 1}",
+            f"remaining load for row {i + 1}",
         )  # fmt: skip
         size = sum(u[k, i] ** 2 for k in range(i + 1))
         takes = u[i, i] ** 2 > _MIN_ROW_SHARE**2 * size
         added, adding = _scalar_equation(
             f"taken_{i + 1}",
             sp.Piecewise((remainder_i / u[i, i], takes), (0, True)),
-            f"row {i + 1} takes",
+            f"part of row {i + 1}",
         )
         carried_i, carried_equation = _scalar_equation(
-            f"rest_{i + 1}", sp.Piecewise((0, takes), (remainder_i, True)), f"row {i + 1} leaves"
+            f"rest_{i + 1}",
+            sp.Piecewise((0, takes), (remainder_i, True)),
+            f"remainder after row {i + 1}",
         )
         equations += [equation, adding, carried_equation]
         carried.append(added)
         uncarried.append(carried_i)
     whole, remaining = symbol("d_all", 6), symbol("e_rest", 6)
-    total = [TAKEN.symbol[i, 0] + carried[i] for i in range(6)]
+    total = [ROW_LOAD.symbol[i, 0] + carried[i] for i in range(6)]
     equations += [
         Equation("d + U^-T e", whole, sp.ImmutableDenseMatrix(total)),
-        Equation("what is left of e", remaining, sp.ImmutableDenseMatrix(uncarried)),
+        Equation("remainder of e", remaining, sp.ImmutableDenseMatrix(uncarried)),
     ]
     return tuple(equations), whole, remaining
 
@@ -201,22 +203,24 @@ def qr_eliminate(nu: int) -> Derivation:
         equations += (
             *_gain_equations(nu, rows, surplus),
             Equation(
-                "e_Q = e + G^T (tau - H^T e)", REST.symbol, uncarried + gain.symbol.T * surplus
+                "e_Q = e + G^T (tau - H^T e)",
+                REMAINING_LOAD.symbol,
+                uncarried + gain.symbol.T * surplus,
             ),
         )
     else:
-        equations += (Equation("e_Q = e", REST.symbol, uncarried),)
+        equations += (Equation("e_Q = e", REMAINING_LOAD.symbol, uncarried),)
     outboard_rows = sp.ImmutableDenseMatrix(6, 6, lambda i, j: rows[nu + i, nu + j])
     onward = sp.ImmutableDenseMatrix([rows[nu + i, nu + 6] for i in range(6)])
     equations += (
-        Equation("V", ONWARD.symbol, _triangle_entries(outboard_rows)),
-        Equation("d_V", ONWARD_TAKEN.symbol, onward),
+        Equation("V", CARRIED_ROWS.symbol, _triangle_entries(outboard_rows)),
+        Equation("d_V", CARRIED_ROW_LOAD.symbol, onward),
     )
     return Derivation(
         f"generic{nu}",
-        f"rows behind a hinge with {free_speeds(nu)}",
-        (h, rotor, FLOOR, ROWS, TAKEN, E, tau),
-        (gain, offset, ONWARD, ONWARD_TAKEN, REST),
+        f"rows outboard of a hinge with {free_speeds(nu)}",
+        (h, rotor, FLOOR, ROWS, ROW_LOAD, E, tau),
+        (gain, offset, CARRIED_ROWS, CARRIED_ROW_LOAD, REMAINING_LOAD),
         equations,
         sources=SOURCES_QR,
     )
@@ -281,7 +285,7 @@ def merge() -> Derivation:
     A row V of the hinge is V X of the parent, X = [R^T  -R^T r~; 0  R^T]; rotations combine
     both into one triangle.
     """
-    v, parent_rows = triangular(ONWARD.symbol), triangular(PARENT_ROWS.symbol)
+    v, parent_rows = triangular(CARRIED_ROWS.symbol), triangular(PARENT_ROWS.symbol)
     turned, linear_part = symbol("V_a", 6, 3), symbol("V_r", 6, 3)
     back = R.symbol.T
     linear = sp.ImmutableDenseMatrix(6, 3, lambda i, j: v[i, j])
@@ -291,8 +295,8 @@ def merge() -> Derivation:
     return Derivation(
         "qr",
         "rows added to those of the parent",
-        (R, SHIFT, ONWARD, ONWARD_TAKEN, REST, PARENT_ROWS, PARENT_TAKEN),
-        (ROWS, TAKEN, PARENT_E),
+        (R, SHIFT, CARRIED_ROWS, CARRIED_ROW_LOAD, REMAINING_LOAD, PARENT_ROWS, PARENT_ROW_LOAD),
+        (ROWS, ROW_LOAD, PARENT_E),
         (
             Equation("V by accelerations at the parent", turned, linear * back),
             Equation(
@@ -305,15 +309,15 @@ def merge() -> Derivation:
                 rows,
                 Triangle(
                     sp.BlockMatrix(
-                        [[parent_rows, PARENT_TAKEN.symbol],
-                         [sp.BlockMatrix([[turned, linear_part]]), ONWARD_TAKEN.symbol]]
+                        [[parent_rows, PARENT_ROW_LOAD.symbol],
+                         [sp.BlockMatrix([[turned, linear_part]]), CARRIED_ROW_LOAD.symbol]]
                     ),
                     6,
                 ),
             ),
             Equation("U", ROWS.symbol, _triangle_entries(triangle)),
-            Equation("d", TAKEN.symbol, sp.ImmutableDenseMatrix([rows[i, 6] for i in range(6)])),
-            Equation("X^T e_Q", PARENT_E.symbol, transport(REST.symbol)),
+            Equation("d", ROW_LOAD.symbol, sp.ImmutableDenseMatrix([rows[i, 6] for i in range(6)])),
+            Equation("X^T e_Q", PARENT_E.symbol, transport(REMAINING_LOAD.symbol)),
         ),
         sources=SOURCES_QR,
     )  # fmt: skip
@@ -326,11 +330,11 @@ def restored() -> Derivation:
     return Derivation(
         "qr",
         "S and e of rows",
-        (ROWS, TAKEN, E),
+        (ROWS, ROW_LOAD, E),
         (S, e),
         (
             Equation("S = U^T U", S.symbol, u.T * u, symmetric=True),
-            Equation("U^T d + e", e.symbol, u.T * TAKEN.symbol + E.symbol),
+            Equation("U^T d + e", e.symbol, u.T * ROW_LOAD.symbol + E.symbol),
         ),
         sources=SOURCES_QR,
     )

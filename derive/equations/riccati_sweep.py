@@ -124,7 +124,7 @@ def forward(motion: HingeMotion, inputs: tuple[Quantity, ...]) -> Derivation:
     )
     return Derivation(
         motion.hinge.name,
-        f"bias motion behind the {motion.hinge.title}",
+        f"bias motion outboard of the {motion.hinge.title}",
         (RT, RO, *inputs, s, PARENT_MOTION),
         (R, SHIFT, MOTION, Quantity(rates, "", "coordinate rates")),
         (*equations, Equation("coordinate rates", rates, motion.in_arrays(motion.rates))),
@@ -140,7 +140,7 @@ def forward_generic(nu: int) -> Derivation:
     hinge = tuple(Quantity(x) for x in (rotation, d, h, v, w, c, s))
     return Derivation(
         f"generic{nu}",
-        f"bias motion behind a hinge with {nu} speeds",
+        f"bias motion outboard of a hinge with {nu} speeds",
         (RT, RO, *hinge, PARENT_MOTION),
         (R, SHIFT, MOTION),
         equations,
@@ -247,10 +247,7 @@ def condense(
             Equation("e_Q", load, replace_rows(symbol("e_full", 6), tau.symbol, units)),
         ]
     else:
-        equations = [
-            Equation("S_Q = S", reduced, S.symbol),
-            Equation("e_Q = e", load, E.symbol),
-        ]
+        equations = [Equation("S_Q = S", reduced, S.symbol), Equation("e_Q = e", load, E.symbol)]
     steps, transported = congruence("S_Q")
     equations += [
         *steps,
@@ -306,17 +303,17 @@ def pivot_guards(
 
 def _own_or_composite(body_floor: sp.Expr, composite: sp.Basic, first: int) -> sp.Expr:
     """Limit from the body's own inertia, or from the composite inertia if that is zero."""
-    return sp.Piecewise((body_floor, body_floor > 0), (floor_of(composite)[first // 3], True))
+    return sp.Piecewise((body_floor, body_floor > 0), (inertia_floor(composite)[first // 3], True))
 
 
-def floor_of(mass: sp.Basic) -> sp.ImmutableDenseMatrix:
+def inertia_floor(mass: sp.Basic) -> sp.ImmutableDenseMatrix:
     """Share of the mean mass and mean moment of inertia of a mass matrix (6 x 6)."""
     return sp.ImmutableDenseMatrix(
         [PIVOT_FLOOR * sum(mass[first + k, first + k] for k in range(3)) / 3 for first in (0, 3)]
     )
 
 
-def recover(
+def back_substitute(
     nu: int,
     subspace: sp.MatrixBase | None = None,
     inputs: tuple[Quantity, ...] = (),
@@ -361,14 +358,14 @@ def effort(nu: int) -> Derivation:
     )
 
 
-def exerted(nu: int) -> Derivation:
+def required_load(nu: int) -> Derivation:
     """e = S H udot: load at P that the accelerations of a hinge require."""
     h = Quantity(symbol("H", 6, nu), "", "motion subspace")
     rates = Quantity(symbol("udot", nu), "", "accelerations of the coordinates")
     inertia = Quantity(S.symbol, "", "inertia of everything outboard, at P", symmetric=True)
     return Derivation(
         f"generic{nu}",
-        f"load of what a hinge with {nu} speeds accelerates",
+        f"load of the bodies accelerated by a hinge with {nu} speeds",
         (inertia, h, rates),
         (E,),
         (Equation("e = S H udot", E.symbol, S.symbol * (h.symbol * rates.symbol)),),

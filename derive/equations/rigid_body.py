@@ -14,7 +14,7 @@ import sympy as sp
 from ..definition.derivation import Derivation, Equation, Quantity, tilde, vector
 from ..definition.notation import Matrix, Tilde, explicit
 from . import newton_euler as ne
-from .mass_distribution import of_tensor
+from .mass_distribution import from_inertia_tensor
 
 SOURCE = "Rui, Wang, Zhang, Transfer Matrix Method for Multibody Systems, Wiley 2019, ch. 5"
 
@@ -40,7 +40,7 @@ def inertial_wrench(acceleration: sp.MatrixSymbol) -> Matrix:
     a = explicit(acceleration)
     inertia = explicit(INERTIA)
     symmetric = Matrix(3, 3, lambda i, j: inertia[min(i, j), max(i, j)])
-    body = of_tensor(MASS[0, 0], explicit(CENTER), symmetric)
+    body = from_inertia_tensor(MASS[0, 0], explicit(CENTER), symmetric)
     names = dict(zip((*ne.A0, *ne.OMEGADOT), a, strict=True))
     names |= dict(zip(ne.OMEGA, explicit(OMEGA), strict=True))
     wrench = ne.inertial_force(body).col_join(ne.euler_form(body))
@@ -92,8 +92,8 @@ def newton_euler_form() -> Derivation:
         title="Newton and Euler about the input end I, and the mass matrix that follows",
         notes=(
             "rdd_I is the acceleration of I, omegadot the angular acceleration; q_I and m_I are "
-            "the force and the moment that this motion needs there. a_I is [rdd_I; omegadot] and "
-            "f_I is [q_I; m_I], so that f_I = mass_matrix a_I + bias.",
+            "the force and the moment that this motion requires there. a_I is [rdd_I; omegadot] "
+            "and f_I is [q_I; m_I], so that f_I = mass_matrix a_I + bias.",
             "Parameters of the element are mass = M, mc = M r_IC and J = J_I.",
         ),
     )

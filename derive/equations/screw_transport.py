@@ -22,7 +22,7 @@ from ..definition.derivation import Derivation, Equation, Quantity, tilde
 from .block_matrices import part, stack, symbol
 from .riccati_sweep import SOURCES, E, S
 
-TURN = Quantity(symbol("turn", 2), "", "cosine and sine of the angle")
+ROTATION = Quantity(symbol("turn", 2), "", "cosine and sine of the angle")
 SHIFT_ALONG = Quantity(symbol("d", 1), "m", "shift along the axis")
 R_GIVEN = Quantity(symbol("Rc", 3, 3), "", "rotation, outboard axes to inboard axes")
 OUT_S = Quantity(symbol("S_I", 6, 6), "", "f = S a + e at the inboard origin", symmetric=True)
@@ -79,7 +79,9 @@ class Stage:
         """Intermediate quantity of this stage."""
         return symbol(name + self.mark, rows, columns)
 
-    def carried(self, s: sp.MatrixSymbol, e: sp.MatrixSymbol, out: Pair) -> tuple[Equation, ...]:
+    def carry_equations(
+        self, s: sp.MatrixSymbol, e: sp.MatrixSymbol, out: Pair
+    ) -> tuple[Equation, ...]:
         """Equations that carry s and e to the inboard origin; `out` are the results' symbols."""
         rotation = Equation("rotation", self.symbol("R", 3, 3), self.rotation)
         return (
@@ -152,7 +154,9 @@ class Stage:
 
     # --- motion and accelerations ---------------------------------------------------------------
 
-    def behind(self, motion: sp.MatrixSymbol, out: sp.MatrixSymbol) -> tuple[Equation, ...]:
+    def outboard_motion(
+        self, motion: sp.MatrixSymbol, out: sp.MatrixSymbol
+    ) -> tuple[Equation, ...]:
         """Bias motion of the outboard frame, which is at rest in the inboard one."""
         w, wd, rdd = (part(motion, n) for n in (0, 3, 6))
         turn, carrier = self.symbol("R", 3, 3), self.symbol("K", 3, 3)
@@ -188,7 +192,7 @@ def _entries(symbol: sp.MatrixSymbol) -> Scalars:
 
 def screw_from_inputs(axis: str) -> Stage:
     """Screw about `axis` whose rotation and shift are inputs."""
-    return Stage(AXES[axis], TURN.symbol[0, 0], TURN.symbol[1, 0], SHIFT_ALONG.symbol[0, 0])
+    return Stage(AXES[axis], ROTATION.symbol[0, 0], ROTATION.symbol[1, 0], SHIFT_ALONG.symbol[0, 0])
 
 
 def condense(axis: str) -> Derivation:
@@ -196,9 +200,9 @@ def condense(axis: str) -> Derivation:
     return Derivation(
         "screw",
         f"S and e across a screw about {axis}",
-        (TURN, SHIFT_ALONG, S, E),
+        (ROTATION, SHIFT_ALONG, S, E),
         (OUT_S, OUT_E),
-        screw_from_inputs(axis).carried(S.symbol, E.symbol, (OUT_S.symbol, OUT_E.symbol)),
+        screw_from_inputs(axis).carry_equations(S.symbol, E.symbol, (OUT_S.symbol, OUT_E.symbol)),
         sources=SOURCES,
     )
 

@@ -13,11 +13,11 @@ from ..definition.derivation import Derivation, Equation, Quantity, tilde, vecto
 from .block_matrices import column, part, stack, symbol
 from .riccati_sweep import PARENT_E, SHIFT, E, R, free_speeds, transport
 from .tangent_sweep import (
-    KNOWN,
     KNOWN_LOAD,
+    KNOWN_MOTION,
+    PARENT_RATE,
     ROWS_S,
     SOURCES,
-    TURN_PARENT,
     V_REL,
     W_REL,
     Z_PARENT,
@@ -25,13 +25,13 @@ from .tangent_sweep import (
     outboard_motion,
 )
 
-TURN = Quantity(vector("theta", 3), "", "turn of the body along the direction, body axes")
-PLACE = Quantity(vector("x", 3), "", "change of place of P along the direction, body axes")
+ROTATION = Quantity(vector("theta", 3), "", "rotation of the body along the direction, body axes")
+DISPLACEMENT = Quantity(vector("x", 3), "", "displacement of P along the direction, body axes")
 _OF_Q = Quantity(vector("Q", 9), "", "motion of Q in body axes: w, wd, and a of its carrier at P")
-_LOAD = Quantity(vector("f", 6), "N, N*m", "load at P that is carried")
+_LOAD = Quantity(vector("f", 6), "N, N*m", "carried load at P")
 _COLUMN = (
     Quantity(vector("B", 9), "", "motion along the direction"),
-    Quantity(vector("G", 6), "", "change of the load that is carried"),
+    Quantity(vector("G", 6), "", "change of the carried load"),
 )
 
 
@@ -43,12 +43,12 @@ def tangent_turned() -> Derivation:
     )
     return Derivation(
         "frames",
-        "turn and change of place along a direction",
+        "rotation and displacement along a direction",
         tuple(map(Quantity, (r, d_r, d_d))),
-        (TURN, PLACE),
+        (ROTATION, DISPLACEMENT),
         (
-            Equation("theta~ = R^T dR", TURN.symbol, turn),
-            Equation("R^T dd", PLACE.symbol, r.T * d_d),
+            Equation("theta~ = R^T dR", ROTATION.symbol, turn),
+            Equation("R^T dd", DISPLACEMENT.symbol, r.T * d_d),
         ),
         sources=SOURCES,
     )
@@ -59,12 +59,12 @@ def tangent_along(nu: int) -> Derivation:
     h, d_q = symbol("H", 6, nu), symbol("d_q", nu)
     return Derivation(
         f"generic{nu}",
-        f"turn and change of place along coordinates of a hinge with {free_speeds(nu)}",
+        f"rotation and displacement along coordinates of a hinge with {free_speeds(nu)}",
         (Quantity(h), Quantity(d_q)),
-        (TURN, PLACE),
+        (ROTATION, DISPLACEMENT),
         (
-            Equation("theta = H_w dq", TURN.symbol, h[3:, :] * d_q),
-            Equation("R^T dd = H_v dq", PLACE.symbol, h[:3, :] * d_q),
+            Equation("theta = H_w dq", ROTATION.symbol, h[3:, :] * d_q),
+            Equation("R^T dd = H_v dq", DISPLACEMENT.symbol, h[:3, :] * d_q),
         ),
         sources=SOURCES,
     )
@@ -103,7 +103,7 @@ def tangent_carrier(nu: int) -> Derivation:
     )
 
 
-_NOTHING = sp.ImmutableDenseMatrix(sp.zeros(3, 1))
+_ZERO_COLUMN = sp.ImmutableDenseMatrix(sp.zeros(3, 1))
 
 
 def _direction_equations(
@@ -115,15 +115,15 @@ def _direction_equations(
     displacement: sp.MatrixBase | None = None,
 ) -> tuple[Equation, ...]:
     """B and G from the changes across the hinge."""
-    turn = tilde(column(TURN.symbol))
-    displacement = column(PLACE.symbol) if displacement is None else displacement
+    turn = tilde(column(ROTATION.symbol))
+    displacement = column(DISPLACEMENT.symbol) if displacement is None else displacement
     turning, rate, acceleration = (part(_OF_Q.symbol, 3 * k) for k in range(3))
     d_turning = symbol("dw_Q", 3)
     relative, spin = tilde(column(w)), tilde(turning)
     force, moment = part(_LOAD.symbol, 0), part(_LOAD.symbol, 3)
     b, g = (quantity.symbol for quantity in _COLUMN)
     return (
-        Equation("slope of w_Q", d_turning, -turn * turning),
+        Equation("derivative of w_Q", d_turning, -turn * turning),
         Equation(
             "B",
             b,
@@ -179,7 +179,9 @@ def tangent_column(nu: int) -> Derivation:
     d_bias = symbol("dc_s", 6)
     row_inputs, row, rows = _row_derivative(nu, d_h.T * _LOAD.symbol)
     equations = (
-        Equation("slope of the own acceleration", d_bias, d_c + d_h * s + h * d_s if nu else d_c),
+        Equation(
+            "derivative of the own acceleration", d_bias, d_c + d_h * s + h * d_s if nu else d_c
+        ),
         *_direction_equations(
             column(v), w, column(d_v), column(d_w), (part(d_bias, 0), part(d_bias, 3))
         ),
@@ -187,7 +189,7 @@ def tangent_column(nu: int) -> Derivation:
     return Derivation(
         f"generic{nu}",
         f"a direction of a hinge with {nu} speeds",
-        (TURN, PLACE, *map(Quantity, (h, s, v, w)), _OF_Q, _LOAD,
+        (ROTATION, DISPLACEMENT, *map(Quantity, (h, s, v, w)), _OF_Q, _LOAD,
          *map(Quantity, (d_h, d_v, d_w, d_c, d_s)), *row_inputs),
         (*_COLUMN, row),
         (*equations, rows) if nu else equations,
@@ -206,15 +208,15 @@ def tangent_steady(nu: int) -> Derivation:
     return Derivation(
         f"generic{nu}",
         f"a direction of a hinge with {free_speeds(nu)}, whose subspace is constant",
-        (TURN, PLACE, *map(Quantity, (h, v, w)), _OF_Q, _LOAD,
+        (ROTATION, DISPLACEMENT, *map(Quantity, (h, v, w)), _OF_Q, _LOAD,
          *map(Quantity, (d_u, d_s)), *row_inputs),
         (*_COLUMN, row),
         (
-            Equation("slope of v", d_v, h[:3, :] * d_u),
-            Equation("slope of w", d_w, h[3:, :] * d_u),
+            Equation("derivative of v", d_v, h[:3, :] * d_u),
+            Equation("derivative of w", d_w, h[3:, :] * d_u),
             Equation("H ds", own_acceleration, h * d_s),
             Equation(
-                "slope of the own acceleration", d_bias,
+                "derivative of the own acceleration", d_bias,
                 stack(part(own_acceleration, 0) + linear_part, part(own_acceleration, 3)),
             ),
             *_direction_equations(
@@ -233,14 +235,19 @@ def tangent_turning(nu: int) -> Derivation:
     row_inputs, row, rows = _row_derivative(nu, None)
     return Derivation(
         f"generic{nu}",
-        f"a direction of a hinge with {free_speeds(nu)}, which turns about constant axes",
-        (TURN, *map(Quantity, (h, w)), _OF_Q, _LOAD, *map(Quantity, (d_u, d_s)), *row_inputs),
+        f"a direction of a hinge with {free_speeds(nu)}, which rotates about constant axes",
+        (ROTATION, *map(Quantity, (h, w)), _OF_Q, _LOAD, *map(Quantity, (d_u, d_s)), *row_inputs),
         (*_COLUMN, row),
         (
-            Equation("slope of w", d_w, h[3:, :] * d_u),
+            Equation("derivative of w", d_w, h[3:, :] * d_u),
             Equation("H_w ds", own_acceleration, h[3:, :] * d_s),
             *_direction_equations(
-                _NOTHING, w, _NOTHING, column(d_w), (_NOTHING, column(own_acceleration)), _NOTHING
+                _ZERO_COLUMN,
+                w,
+                _ZERO_COLUMN,
+                column(d_w),
+                (_ZERO_COLUMN, column(own_acceleration)),
+                _ZERO_COLUMN,
             ),
             rows,
         ),
@@ -256,15 +263,15 @@ def _hinge_quantities(nu: int) -> dict[str, Quantity]:
     sizes = {
         "H": (6, nu, "motion subspace of the unknowns"),
         "B": (nu, 9, "motion along the unknowns"),
-        "G": (nu, 6, "change of the load that is carried"),
-        "W": (nu, nu, "slopes of the rows, a row a direction"),
-        "K": (nu, 6, "S B, a row a direction"),
-        "V": (nu, 6, "K + G, a row a direction"),
+        "G": (nu, 6, "change of the carried load"),
+        "W": (nu, nu, "derivatives of the rows, one row per direction"),
+        "K": (nu, 6, "S B, one row per direction"),
+        "V": (nu, 6, "K + G, one row per direction"),
         "D": (nu, nu, "rows by unknowns"),
         "right": (nu, 9, "rows by the motion"),
         "gain": (nu, 9, "D^-1 times the rows by the motion"),
         "inverse": (nu, nu, "D^-1"),
-        "y": (nu, 1, "D^-1 times what is left of the rows"),
+        "y": (nu, 1, "D^-1 times the remainder of the rows"),
     }
     return {
         name: Quantity(symbol(name, rows, columns), "", meaning)
@@ -327,7 +334,7 @@ def tangent_push(nu: int, known: bool = False) -> Derivation:
     return Derivation(
         f"generic{nu}",
         f"a right-hand side carried across a hinge with {free_speeds(nu)}"
-        + (" and increments that are known" if known else ""),
+        + (" and known increments" if known else ""),
         (R, SHIFT, h, v, inverse, E, load_rows, *((KNOWN_LOAD,) if known else ())),
         (y, PARENT_E),
         (
@@ -360,13 +367,24 @@ def tangent_answer(nu: int, known: bool = False) -> Derivation:
     first, carried = outboard_motion()
     return Derivation(
         f"generic{nu}",
-        f"unknowns of a hinge with {free_speeds(nu)} that answer a right-hand side"
-        + (" and increments that are known" if known else ""),
-        (R, SHIFT, TURN_PARENT, V_REL, W_REL, Z_PARENT, b, gain, y, *((KNOWN,) if known else ())),
+        f"solution of a hinge with {free_speeds(nu)} for a right-hand side"
+        + (" and known increments" if known else ""),
+        (
+            R,
+            SHIFT,
+            PARENT_RATE,
+            V_REL,
+            W_REL,
+            Z_PARENT,
+            b,
+            gain,
+            y,
+            *((KNOWN_MOTION,) if known else ()),
+        ),
         (unknowns, Z),
         (
             first,
-            Equation("Th z_I", motion, carried + KNOWN.symbol if known else carried),
+            Equation("Th z_I", motion, carried + KNOWN_MOTION.symbol if known else carried),
             Equation("x", unknowns.symbol, y.symbol - gain.symbol * motion),
             Equation("z", Z.symbol, motion + b.symbol.T * unknowns.symbol),
         ),

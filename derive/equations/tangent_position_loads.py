@@ -29,15 +29,15 @@ import sympy as sp
 from ..definition.derivation import Derivation, Equation, Quantity, Solve, tilde, vector
 from .block_matrices import column, part, stack, symbol
 from .riccati_sweep import SHIFT, R
-from .tangent_hinge_elimination import PLACE, TURN
-from .tangent_sweep import ANSWER, OWN_D, OWN_K, SOURCES, V_REL, Z_PARENT, D, H, N, V
+from .tangent_hinge_elimination import DISPLACEMENT, ROTATION
+from .tangent_sweep import OWN_D, OWN_K, SOLUTION, SOURCES, V_REL, Z_PARENT, D, H, N, V
 
-P = Quantity(vector("p", 9), "", "change of place: turn, place and velocity of P, own axes")
-_P_PARENT = Quantity(vector("p_I", 9), "", "change of the parent's place, parent axes")
-_ROWS_S = Quantity(symbol("S_p", 9, 6), "", "change of the load by the place, a row an entry")
-_B = Quantity(sp.MatrixSymbol("B_p", N, 9), "", "change of place along the unknowns")
-_GAIN = Quantity(sp.MatrixSymbol("gain", N, 9), "", "D^-1 times the rows by the place")
-_OWN_ROWS = Quantity(sp.MatrixSymbol("Z_p", 9, N), "", "own rows by the place, a row an entry")
+P = Quantity(vector("p", 9), "", "change of pose: rotation, position and velocity of P, own axes")
+_P_PARENT = Quantity(vector("p_I", 9), "", "change of the parent's pose, parent axes")
+_ROWS_S = Quantity(symbol("S_p", 9, 6), "", "change of the load by the pose, one row per entry")
+_B = Quantity(sp.MatrixSymbol("B_p", N, 9), "", "change of pose along the unknowns")
+_GAIN = Quantity(sp.MatrixSymbol("gain", N, 9), "", "D^-1 times the rows by the pose")
+_OWN_ROWS = Quantity(sp.MatrixSymbol("Z_p", 9, N), "", "own rows by the pose, one row per entry")
 
 
 def _carried_displacement() -> sp.BlockMatrix:
@@ -55,7 +55,7 @@ def placed_moved() -> Derivation:
     """p of the outboard body from the motion of the parent."""
     return Derivation(
         "frames",
-        "change of a body's place by the motion of its parent",
+        "change of a body's pose by the motion of its parent",
         (R, SHIFT, Z_PARENT, _P_PARENT),
         (P,),
         (Equation("Th_p p_I + Th_z z_I", P.symbol, _carried_displacement()),),
@@ -67,12 +67,12 @@ def placed_pose() -> Derivation:
     """Changes of axes, position and velocity of a body by its displacement."""
     axes = Quantity(symbol("A", 3, 3), "", "axes, body to inertial")
     d_axes = Quantity(symbol("d_A", 3, 3), "", "their change")
-    d_place = Quantity(vector("d_x", 3), "m", "change of place of P, inertial axes")
+    d_place = Quantity(vector("d_x", 3), "m", "displacement of P, inertial axes")
     d_velocity = Quantity(vector("d_v", 3), "m/s", "change of velocity of P, own axes")
     turn, position, velocity = (part(P.symbol, 3 * k) for k in range(3))
     return Derivation(
         "frames",
-        "pose and velocity by a change of place",
+        "pose and velocity by a change of pose",
         (axes, P),
         (d_axes, d_place, d_velocity),
         (
@@ -89,16 +89,16 @@ def placed_column() -> Derivation:
     velocity = Quantity(vector("v_P", 3), "m/s", "velocity of P, own axes")
     d_v = Quantity(vector("d_v", 3), "m/s", "change of the relative velocity")
     of_q = Quantity(vector("Q", 9), "", "motion of Q in body axes: w first")
-    turn, position = column(TURN.symbol), column(PLACE.symbol)
+    turn, position = column(ROTATION.symbol), column(DISPLACEMENT.symbol)
     carried = sp.ImmutableDenseMatrix(column(velocity.symbol) - column(V_REL.symbol))
     velocity_change = (
         column(d_v.symbol) - tilde(turn) * carried + tilde(part(of_q.symbol, 0)) * position
     )
     return Derivation(
         "frames",
-        "change of place along a direction",
-        (TURN, PLACE, velocity, V_REL, d_v, of_q),
-        (Quantity(symbol("B_p", 9), "", "change of place along the direction"),),
+        "change of pose along a direction",
+        (ROTATION, DISPLACEMENT, velocity, V_REL, d_v, of_q),
+        (Quantity(symbol("B_p", 9), "", "change of pose along the direction"),),
         (Equation("B_p", symbol("B_p", 9), stack(turn, position, velocity_change)),),
         sources=SOURCES,
     )
@@ -106,7 +106,7 @@ def placed_column() -> Derivation:
 
 def placed_carry() -> Derivation:
     """S_p Th_p and S_p Th_z, and both carried by X^T to the parent."""
-    s_th = Quantity(symbol("T_p", 9, 6), "", "S_p Th_p, a row an entry")
+    s_th = Quantity(symbol("T_p", 9, 6), "", "S_p Th_p, one row per entry")
     by_spin = Quantity(symbol("T_w", 3, 6), "", "S_p Th_z by angular velocity", accumulate=True)
     to_place = Quantity(symbol("S_pI", 9, 6), "", "that of the parent", accumulate=True)
     to_spin = Quantity(symbol("S_wI", 3, 6), "", "the parent's S, of it that", accumulate=True)
@@ -121,7 +121,7 @@ def placed_carry() -> Derivation:
     moment = R.symbol * total[3:, :] + lever * pushed
     return Derivation(
         "frames",
-        "change of a load by place carried to the parent",
+        "change of a load by the pose, carried to the parent",
         (R, SHIFT, _ROWS_S),
         (s_th, by_spin, to_place, to_spin),
         (
@@ -130,9 +130,7 @@ def placed_carry() -> Derivation:
             Equation("by velocity", t_velocity, velocity * R.symbol.T),
             Equation("by angular velocity", t_spin, -(t_velocity * lever)),
             Equation(
-                "S_p [Th_p, Th_z]",
-                total,
-                sp.BlockMatrix([[t_turn, t_place, t_velocity, t_spin]]),
+                "S_p [Th_p, Th_z]", total, sp.BlockMatrix([[t_turn, t_place, t_velocity, t_spin]])
             ),
             Equation("S_p Th_p, by rows", s_th.symbol, total[:, :9].T),
             Equation("S_p Th_z, by rows", by_spin.symbol, total[:, 9:].T),
@@ -147,19 +145,21 @@ def placed_carry() -> Derivation:
 
 def placed_known() -> Derivation:
     """Contribution of a known displacement to `tangent_known`."""
-    displacement = Quantity(symbol("b_p", 9), "", "change of place that is known")
-    load_rows = Quantity(symbol("e_S", 6), "N, N*m", "load by what is known", accumulate=True)
+    displacement = Quantity(symbol("b_p", 9), "", "known change of pose")
+    load_rows = Quantity(
+        symbol("e_S", 6), "N, N*m", "load due to known increments", accumulate=True
+    )
     carried = Quantity(symbol("e_b", 6), "N, N*m", "the same, as it is carried", accumulate=True)
     load = symbol("e_p", 6)
     return Derivation(
         "frames",
-        "load by a change of place that is known",
+        "load due to a known change of pose",
         (_ROWS_S, displacement),
         (load_rows, carried),
         (
             Equation("S_p b_p", load, _ROWS_S.symbol.T * displacement.symbol),
-            Equation("to what is felt", load_rows.symbol, load),
-            Equation("to what is carried", carried.symbol, load),
+            Equation("to the load along the unknowns", load_rows.symbol, load),
+            Equation("to the carried load", carried.symbol, load),
         ),
         sources=SOURCES,
     )
@@ -170,10 +170,10 @@ def placed_known() -> Derivation:
 
 def placed_rows() -> Derivation:
     """Rows of a hinge by displacement."""
-    rows = Quantity(_OWN_ROWS.symbol, "", "rows by the place, a row an entry")
+    rows = Quantity(_OWN_ROWS.symbol, "", "rows by the pose, one row per entry")
     return Derivation(
         "tangent",
-        "rows of a hinge by the change of place",
+        "rows of a hinge by the change of pose",
         (H, _ROWS_S),
         (rows,),
         (Equation("S_p^T H", rows.symbol, _ROWS_S.symbol * H.symbol),),
@@ -187,7 +187,7 @@ def placed_own() -> Derivation:
     rows = Quantity(OWN_D.symbol, accumulate=True)
     return Derivation(
         "tangent",
-        "load and rows along the unknowns by the change of place",
+        "load and rows along the unknowns by the change of pose",
         (_B, _ROWS_S, _OWN_ROWS),
         (load, rows),
         (
@@ -201,11 +201,11 @@ def placed_own() -> Derivation:
 def placed_reduce() -> Derivation:
     """S_p after elimination of the unknowns of a hinge."""
     inverse = Quantity(sp.MatrixSymbol("inverse", N, N), "", "D^-1")
-    v = Quantity(sp.MatrixSymbol("V", N, 6), "", "K + G, a row a direction")
+    v = Quantity(sp.MatrixSymbol("V", N, 6), "", "K + G, one row per direction")
     change = Quantity(_ROWS_S.symbol, "", _ROWS_S.meaning, accumulate=True)
     return Derivation(
         "tangent",
-        "unknowns of a hinge eliminated from loads by place",
+        "unknowns of a hinge eliminated from loads by the pose",
         (inverse, _OWN_ROWS, v),
         (_GAIN, change),
         (
@@ -218,20 +218,18 @@ def placed_reduce() -> Derivation:
 
 def placed_node() -> Derivation:
     """S_p after elimination of the unknowns of a flexible body."""
-    right = Quantity(sp.MatrixSymbol("right", N, 9), "", "rows by the place")
-    without = Quantity(symbol("S_c", 9, 6), "", "S_p without the unknowns, a row an entry")
+    right = Quantity(sp.MatrixSymbol("right", N, 9), "", "rows by the pose")
+    without = Quantity(symbol("S_c", 9, 6), "", "S_p without the unknowns, one row per entry")
     return Derivation(
         "tangent",
-        "unknowns of a flexible body eliminated from loads by place",
+        "unknowns of a flexible body eliminated from loads by the pose",
         (H, V, D, _ROWS_S, _OWN_ROWS),
         (right, _GAIN, without),
         (
             Equation("H^T S_p", right.symbol, H.symbol.T * _ROWS_S.symbol.T + _OWN_ROWS.symbol.T),
             Equation("D^-1 H^T S_p", _GAIN.symbol, Solve(D.symbol, right.symbol)),
             Equation(
-                "S_p - V D^-1 H^T S_p",
-                without.symbol,
-                _ROWS_S.symbol - _GAIN.symbol.T * V.symbol.T,
+                "S_p - V D^-1 H^T S_p", without.symbol, _ROWS_S.symbol - _GAIN.symbol.T * V.symbol.T
             ),
         ),
         sources=SOURCES,
@@ -240,7 +238,7 @@ def placed_node() -> Derivation:
 
 def placed_absorb() -> Derivation:
     """Complement of `absorb`: position-dependent loads outboard of a port of a flexible body."""
-    s_th = Quantity(symbol("T_p", 9, 6), "", "S_p Th_p, a row an entry")
+    s_th = Quantity(symbol("T_p", 9, 6), "", "S_p Th_p, one row per entry")
     load = Quantity(OWN_K.symbol, accumulate=True)
     rows = Quantity(_OWN_ROWS.symbol, accumulate=True)
     by_unknowns = Quantity(OWN_D.symbol, accumulate=True)
@@ -250,7 +248,7 @@ def placed_absorb() -> Derivation:
     parent_load = sp.BlockMatrix([[pushed.T, (R.symbol * k[3:, :] + lever * pushed).T]])
     return Derivation(
         "tangent",
-        "loads by place of what hangs on a port, as the unknowns of its body see them",
+        "loads by the pose of the part outboard of a port, along the unknowns of its body",
         (R, SHIFT, H, _B, _ROWS_S, s_th),
         (load, rows, by_unknowns),
         (
@@ -266,10 +264,10 @@ def placed_absorb() -> Derivation:
 
 def placed_left() -> Derivation:
     """y less the contribution of the displacement to the rows."""
-    result = Quantity(ANSWER.symbol, "", "what is left of the rows", accumulate=True)
+    result = Quantity(SOLUTION.symbol, "", "the remainder of the rows", accumulate=True)
     return Derivation(
         "tangent",
-        "rows less what the change of place makes of them",
+        "rows less their change by the change of pose",
         (_GAIN, P),
         (result,),
         (Equation("- D^-1 H^T S_p p", result.symbol, -(_GAIN.symbol * P.symbol)),),

@@ -45,23 +45,25 @@ SOURCES = (
     "Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)",
 )
 
-TURN_PARENT = Quantity(vector("w_I", 3), "rad/s", "angular velocity of the parent, parent axes")
+PARENT_RATE = Quantity(vector("w_I", 3), "rad/s", "angular velocity of the parent, parent axes")
 V_REL = Quantity(vector("v", 3), "m/s", "relative velocity of the hinge, body axes")
 W_REL = Quantity(vector("w", 3), "rad/s", "relative angular velocity of the hinge, body axes")
 Z_PARENT = Quantity(vector("z_I", 9), "", "change of the parent's motion, parent axes")
 Z = Quantity(vector("z", 9), "", "change of the body's motion, own axes")
-ROWS_S = Quantity(symbol("S", 9, 6), "", "change of the load by that of the motion, a row an entry")
+ROWS_S = Quantity(
+    symbol("S", 9, 6), "", "change of the load by that of the motion, one row per entry"
+)
 
 
 def _spin_acceleration() -> sp.ImmutableDenseMatrix:
     """Acceleration of P by the parent's change of angular velocity: (w x r)~ + w~ r~."""
-    w, r = column(TURN_PARENT.symbol), column(SHIFT.symbol)
+    w, r = column(PARENT_RATE.symbol), column(SHIFT.symbol)
     return sp.ImmutableDenseMatrix(tilde(tilde(w) * r) + tilde(w) * tilde(r))
 
 
 def tangent_carry() -> Derivation:
     """S Th, and X^T S Th added to the parent's S."""
-    s_th = Quantity(symbol("T", 9, 6), "", "S Th, a row an entry")
+    s_th = Quantity(symbol("T", 9, 6), "", "S Th, one row per entry")
     parent = Quantity(symbol("S_I", 9, 6), "", "that of the parent", accumulate=True)
     s = ROWS_S.symbol.T
     turn, rate, linear = (s[:, 3 * k : 3 * k + 3] for k in range(3))
@@ -73,7 +75,7 @@ def tangent_carry() -> Derivation:
     return Derivation(
         "frames",
         "change of a load carried to the parent",
-        (R, SHIFT, TURN_PARENT, V_REL, W_REL, ROWS_S),
+        (R, SHIFT, PARENT_RATE, V_REL, W_REL, ROWS_S),
         (s_th, parent),
         (
             Equation("relative velocity, parent axes", velocity, R.symbol * V_REL.symbol),
@@ -106,9 +108,7 @@ def outboard_motion() -> tuple[Equation, sp.BlockMatrix]:
     relative, velocity = tilde(column(W_REL.symbol)), tilde(column(V_REL.symbol))
     acceleration = linear - lever * rate - _spin_acceleration() * turn
     return Equation("change of the angular velocity", dw, R.symbol.T * turn), stack(
-        dw,
-        R.symbol.T * rate - relative * dw,
-        R.symbol.T * acceleration - 2 * (velocity * dw),
+        dw, R.symbol.T * rate - relative * dw, R.symbol.T * acceleration - 2 * (velocity * dw)
     )
 
 
@@ -118,7 +118,7 @@ def tangent_moved() -> Derivation:
     return Derivation(
         "frames",
         "change of a body's motion by that of its parent's",
-        (R, SHIFT, TURN_PARENT, V_REL, W_REL, Z_PARENT),
+        (R, SHIFT, PARENT_RATE, V_REL, W_REL, Z_PARENT),
         (Z,),
         (first, Equation("Th z_I", Z.symbol, motion)),
         sources=SOURCES,
@@ -127,9 +127,13 @@ def tangent_moved() -> Derivation:
 
 # --- increments that are known ------------------------------------------------------------------
 
-KNOWN = Quantity(symbol("b", 9), "", "change of motion that is known")
-KNOWN_LOAD = Quantity(symbol("e_b", 6), "N, N*m", "load by what is known, without the unknowns")
-_TURNED_LOAD = Quantity(symbol("g", 6), "N, N*m", "change of the carried load by what is known")
+KNOWN_MOTION = Quantity(symbol("b", 9), "", "known change of motion")
+KNOWN_LOAD = Quantity(
+    symbol("e_b", 6), "N, N*m", "load due to known increments, without the unknowns"
+)
+_ROTATED_LOAD = Quantity(
+    symbol("g", 6), "N, N*m", "change of the carried load due to known increments"
+)
 
 
 def tangent_known() -> Derivation:
@@ -138,15 +142,15 @@ def tangent_known() -> Derivation:
     With S after elimination of the unknowns, the rows of the unknowns only need z + b in place
     of z (see `tangent_answer`).
     """
-    load_rows = Quantity(symbol("e_S", 6), "N, N*m", "load by the motion that is known")
+    load_rows = Quantity(symbol("e_S", 6), "N, N*m", "load due to the known motion")
     return Derivation(
         "frames",
-        "load by a motion that is known",
-        (ROWS_S, KNOWN, _TURNED_LOAD),
+        "load due to a known motion",
+        (ROWS_S, KNOWN_MOTION, _ROTATED_LOAD),
         (load_rows, KNOWN_LOAD),
         (
-            Equation("S b", load_rows.symbol, ROWS_S.symbol.T * KNOWN.symbol),
-            Equation("S b + g", KNOWN_LOAD.symbol, load_rows.symbol + _TURNED_LOAD.symbol),
+            Equation("S b", load_rows.symbol, ROWS_S.symbol.T * KNOWN_MOTION.symbol),
+            Equation("S b + g", KNOWN_LOAD.symbol, load_rows.symbol + _ROTATED_LOAD.symbol),
         ),
         sources=SOURCES,
     )
@@ -166,16 +170,16 @@ def _square(name: str, meaning: str) -> Quantity:
 
 H = Quantity(sp.MatrixSymbol("H", 6, N), "", "motion subspace of the unknowns")
 B = _rows("B", 9, "motion along the unknowns")
-G = _rows("G", 6, "change of the load that is carried")
-W = _square("W", "slopes of the rows, a row a direction")
+G = _rows("G", 6, "change of the carried load")
+W = _square("W", "derivatives of the rows, one row per direction")
 D = _square("D", "rows by unknowns")
 V = Quantity(sp.MatrixSymbol("V", 6, N), "", "K + G")
 GAIN = _rows("gain", 9, "D^-1 times the rows by the motion")
-ANSWER = Quantity(sp.MatrixSymbol("y", N, 1), "", "D^-1 times what is left of the rows")
+SOLUTION = Quantity(sp.MatrixSymbol("y", N, 1), "", "D^-1 times the remainder of the rows")
 RIGHT = _rows("right", 9, "rows by the motion")
 OWN_K = _rows("K", 6, "own load along the unknowns")
-OWN_ROWS = Quantity(sp.MatrixSymbol("Z_z", 9, N), "", "own rows by the motion, a row an entry")
-OWN_D = _square("Z_x", "own rows by the unknowns, a row a direction")
+OWN_ROWS = Quantity(sp.MatrixSymbol("Z_z", 9, N), "", "own rows by the motion, one row per entry")
+OWN_D = _square("Z_x", "own rows by the unknowns, one row per direction")
 
 
 def invert() -> Derivation:
@@ -192,7 +196,7 @@ def invert() -> Derivation:
 
 def node() -> Derivation:
     """Elimination of the unknowns of a flexible body."""
-    without = Quantity(symbol("S_c", 9, 6), "", "S without the unknowns, a row an entry")
+    without = Quantity(symbol("S_c", 9, 6), "", "S without the unknowns, one row per entry")
     s = ROWS_S.symbol.T
     k = symbol("K_x", 6, N)
     return Derivation(
@@ -211,9 +215,7 @@ def node() -> Derivation:
             Equation("H^T S", RIGHT.symbol, H.symbol.T * s + OWN_ROWS.symbol.T),
             Equation("D^-1 H^T S", GAIN.symbol, Solve(D.symbol, RIGHT.symbol)),
             Equation(
-                "S - V D^-1 H^T S",
-                without.symbol,
-                ROWS_S.symbol - GAIN.symbol.T * V.symbol.T,
+                "S - V D^-1 H^T S", without.symbol, ROWS_S.symbol - GAIN.symbol.T * V.symbol.T
             ),
         ),
         sources=SOURCES,
@@ -222,7 +224,7 @@ def node() -> Derivation:
 
 def absorb() -> Derivation:
     """Contribution of the bodies outboard of a port to the unknowns of a flexible body."""
-    s_th = Quantity(symbol("T", 9, 6), "", "S Th, a row an entry")
+    s_th = Quantity(symbol("T", 9, 6), "", "S Th, one row per entry")
     load = Quantity(OWN_K.symbol, accumulate=True)
     rows = Quantity(OWN_ROWS.symbol, accumulate=True)
     by_unknowns = Quantity(OWN_D.symbol, accumulate=True)
@@ -233,7 +235,7 @@ def absorb() -> Derivation:
     parent_load = sp.BlockMatrix([[pushed.T, (R.symbol * moment + lever * pushed).T]])
     return Derivation(
         "tangent",
-        "what hangs on a port, as the unknowns of its body see it",
+        "part outboard of a port, along the unknowns of its body",
         (R, SHIFT, H, B, G, W, ROWS_S, s_th),
         (k, load, rows, by_unknowns),
         (
@@ -251,17 +253,17 @@ def absorb() -> Derivation:
 def push() -> Derivation:
     """One right-hand side: y = D^-1 (-e_f - H^T e), and the load e + V y."""
     load_rows = Quantity(sp.MatrixSymbol("e_f", N, 1), "", "load of the rows")
-    right_side = Quantity(sp.MatrixSymbol("rest", N, 1), "", "what is left of the rows")
+    right_side = Quantity(sp.MatrixSymbol("rest", N, 1), "", "the remainder of the rows")
     load = Quantity(symbol("e_c", 6), "N, N*m", "load without the unknowns")
     return Derivation(
         "tangent",
         "unknowns eliminated from a right-hand side",
         (H, V, D, E, load_rows),
-        (right_side, ANSWER, load),
+        (right_side, SOLUTION, load),
         (
             Equation("-e_f - H^T e", right_side.symbol, -load_rows.symbol - H.symbol.T * E.symbol),
-            Equation("D^-1 (-e_f - H^T e)", ANSWER.symbol, Solve(D.symbol, right_side.symbol)),
-            Equation("e + V y", load.symbol, E.symbol + V.symbol * ANSWER.symbol),
+            Equation("D^-1 (-e_f - H^T e)", SOLUTION.symbol, Solve(D.symbol, right_side.symbol)),
+            Equation("e + V y", load.symbol, E.symbol + V.symbol * SOLUTION.symbol),
         ),
         sources=SOURCES,
     )
@@ -282,19 +284,19 @@ def lagged() -> Derivation:
 
 
 UNKNOWNS = Quantity(sp.MatrixSymbol("x", N, 1), "", "unknowns")
-BEHIND = Quantity(vector("z_c", 9), "", "change of motion without the unknowns' part")
+BASE_MOTION = Quantity(vector("z_c", 9), "", "change of motion without the unknowns' part")
 
 
 def answer() -> Derivation:
     """x = y - D^-1 H^T S z, and the motion including that of the unknowns."""
     return Derivation(
         "tangent",
-        "unknowns that answer a right-hand side",
-        (B, GAIN, ANSWER, BEHIND),
+        "solution for a right-hand side",
+        (B, GAIN, SOLUTION, BASE_MOTION),
         (UNKNOWNS, Z),
         (
-            Equation("x", UNKNOWNS.symbol, ANSWER.symbol - GAIN.symbol * BEHIND.symbol),
-            Equation("z + B x", Z.symbol, BEHIND.symbol + B.symbol.T * UNKNOWNS.symbol),
+            Equation("x", UNKNOWNS.symbol, SOLUTION.symbol - GAIN.symbol * BASE_MOTION.symbol),
+            Equation("z + B x", Z.symbol, BASE_MOTION.symbol + B.symbol.T * UNKNOWNS.symbol),
         ),
         sources=SOURCES,
     )
@@ -305,19 +307,19 @@ def displaced() -> Derivation:
     return Derivation(
         "tangent",
         "change of motion with the unknowns' part",
-        (B, UNKNOWNS, BEHIND),
+        (B, UNKNOWNS, BASE_MOTION),
         (Z,),
-        (Equation("z + B x", Z.symbol, BEHIND.symbol + B.symbol.T * UNKNOWNS.symbol),),
+        (Equation("z + B x", Z.symbol, BASE_MOTION.symbol + B.symbol.T * UNKNOWNS.symbol),),
         sources=SOURCES,
     )
 
 
 def lag() -> Derivation:
     """Q = (sq 1 - kappa g_q)^-1 of a hinge whose rates depend on its coordinates."""
-    slopes = _square("g_q", "slopes of the rates by the coordinates, a row a direction")
+    slopes = _square("g_q", "derivatives of the rates by the coordinates, one row per direction")
     unit = _square("one", "unit matrix")
     scale = Quantity(vector("sq", 1), "1/s", "inverse time of the step")
-    share = Quantity(vector("kappa", 1), "", "1 where the rates' own slopes count")
+    share = Quantity(vector("kappa", 1), "", "1 to include the derivatives of the rates")
     matrix, out = _square("A", "sq 1 - kappa g_q"), _square("Q", "its inverse")
     return Derivation(
         "tangent",

@@ -27,9 +27,9 @@ FRAME = 12
 
 def _columns(body: Body) -> tuple[Symbols, sp.MatrixSymbol, Quantity]:
     p = Symbols("p", tuple(x.name for x in body.parameters))
-    array = vector("p", len(p) + (0 if body.in_hinge_axes else FRAME))
+    array = vector("p", len(p) + (0 if body.uses_hinge_axes else FRAME))
     meaning = describe_array("parameters", body.parameters)
-    meaning += "; body axes, about its input end" if body.in_hinge_axes else "; then R_u and r_u"
+    meaning += "; body axes, about its input end" if body.uses_hinge_axes else "; then R_u and r_u"
     return p, array, Quantity(array, "", meaning)
 
 
@@ -42,7 +42,9 @@ def _frame(body: Body, array: sp.MatrixSymbol) -> tuple[sp.Matrix, sp.Matrix, sp
     return turn, lever, x
 
 
-def _evaluated(matrix: sp.Matrix, p: Symbols, array: sp.MatrixSymbol) -> sp.ImmutableDenseMatrix:
+def _substitute_parameters(
+    matrix: sp.Matrix, p: Symbols, array: sp.MatrixSymbol
+) -> sp.ImmutableDenseMatrix:
     replace = {s: array[i, 0] for i, s in enumerate(p)}
     return sp.ImmutableDenseMatrix(sp.Matrix(matrix).xreplace(replace))
 
@@ -79,23 +81,23 @@ def inertia(body: Body) -> Derivation:
         f"mass matrix of the {body.title}",
         (parameters,),
         (S,),
-        _mass_equations(body, array, _evaluated(mass, p, array)),
+        _mass_equations(body, array, _substitute_parameters(mass, p, array)),
         sources=body.sources,
     )
 
 
 def bias_load(body: Body) -> Derivation:
-    """e of the single body: residual at the bias motion."""
+    """Derive the load e of f = S a + e of a user-defined body: its residual at the bias motion."""
     p, array, parameters = _columns(body)
-    carried = () if body.in_hinge_axes else _motion_equations(body, array)
+    carried = () if body.uses_hinge_axes else _motion_equations(body, array)
     motion = carried[-1].left if carried else MOTION.symbol
     residual = body.residual(_triple(motion, 6), _triple(motion, 3), _triple(motion, 0), p)
     return Derivation(
         body.name,
-        f"load that the bias motion of the {body.title} needs",
+        f"load required by the bias motion of the {body.title}",
         (parameters, MOTION),
         (E,),
-        (*carried, *_load_equations(body, array, _evaluated(residual, p, array))),
+        (*carried, *_load_equations(body, array, _substitute_parameters(residual, p, array))),
         sources=body.sources,
     )
 
@@ -105,7 +107,7 @@ def kinetic_energy(body: Body) -> Derivation:
     p, array, parameters = _columns(body)
     v, w = vector("v", 3), vector("w", 3)
     energy = sp.MatrixSymbol("T", 1, 1)
-    carried = () if body.in_hinge_axes else _velocity_equations(body, array, v, w)
+    carried = () if body.uses_hinge_axes else _velocity_equations(body, array, v, w)
     v_own, w_own = (carried[1].left, carried[0].left) if carried else (v, w)
     value = sp.Matrix([[body.kinetic_energy(_triple(v_own, 0), _triple(w_own, 0), p)]])
     return Derivation(
@@ -113,7 +115,7 @@ def kinetic_energy(body: Body) -> Derivation:
         f"kinetic energy of the {body.title}",
         (parameters, Quantity(v, "m/s", "velocity of P"), Quantity(w, "rad/s", "angular velocity")),
         (Quantity(energy, "J", "kinetic energy"),),
-        (*carried, Equation("kinetic energy", energy, _evaluated(value, p, array))),
+        (*carried, Equation("kinetic energy", energy, _substitute_parameters(value, p, array))),
         sources=body.sources,
     )
 
@@ -124,7 +126,7 @@ def kinetic_energy(body: Body) -> Derivation:
 def _mass_equations(
     body: Body, array: sp.MatrixSymbol, mass: sp.ImmutableDenseMatrix
 ) -> tuple[Equation, ...]:
-    if body.in_hinge_axes:
+    if body.uses_hinge_axes:
         return (Equation("S = d residual / d acceleration", S.symbol, mass),)
     body_mass, (_, _, x) = sp.MatrixSymbol("S_O", 6, 6), _frame(body, array)
     carry = sp.MatrixSymbol("X", 6, 6)
@@ -155,7 +157,7 @@ def _motion_equations(body: Body, array: sp.MatrixSymbol) -> tuple[Equation, ...
 def _load_equations(
     body: Body, array: sp.MatrixSymbol, residual: sp.ImmutableDenseMatrix
 ) -> tuple[Equation, ...]:
-    if body.in_hinge_axes:
+    if body.uses_hinge_axes:
         return (Equation("e = residual at the bias motion", E.symbol, residual),)
     body_load, carry, (_, _, x) = vector("e_O", 6), sp.MatrixSymbol("X", 6, 6), _frame(body, array)
     return (

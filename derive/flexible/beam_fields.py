@@ -25,7 +25,7 @@ from ..definition.notation import Matrix
 
 _Y, _Z, _X = sp.symbols("y z x", real=True)
 
-POSITION = Quantity(vector("x", 1), "m", "place along the beam")
+POSITION = Quantity(vector("x", 1), "m", "position along the beam")
 INERTIA = Quantity(
     vector("inertia", 3), "", "mass per length (kg/m), int rho y^2 dA, int rho z^2 dA (kg m)"
 )

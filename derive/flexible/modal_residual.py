@@ -45,7 +45,7 @@ HALF = sp.Rational(1, 2)
 
 S_RF = modal_columns("S_rf", 6, "rows of the frame, columns of the modes: [Ct; Gt]")
 S_FF = modal_pair("S_ff", "rows and columns of the modes")
-E_F = modal_vector("e_f", "load that the modes need")
+E_F = modal_vector("e_f", "load required by the modes")
 SECOND_MOMENT_DERIVATIVES = modal_columns("A", 6, "derivatives of the second moments by the modes")
 
 

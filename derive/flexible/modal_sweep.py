@@ -47,7 +47,7 @@ def absorb() -> Derivation:
     rotated_force = R.symbol * force
     return Derivation(
         "modal",
-        "S and e of a port, seen by the modes",
+        "S and e of a port along the modes",
         (R, SHIFT, MODAL_SUBSPACE, S, E),
         (WORK, _accumulating(S_RF), _accumulating(S_FF), _accumulating(E_F)),
         (
@@ -70,7 +70,7 @@ def rebase() -> Derivation:
     coupling = S_RF.symbol
     return Derivation(
         "modal",
-        "frame followed from the section that is held",
+        "frame relative to the supported section",
         (MODAL_SUBSPACE, S, E, S_RF),
         (rebased, _accumulating(S_FF), _accumulating(E_F)),
         (
@@ -202,7 +202,7 @@ def answer() -> Derivation:
     gain = MODAL_GAIN.symbol[:, :6]
     return Derivation(
         "modal",
-        "modal accelerations that answer a load",
+        "modal accelerations due to a load",
         (S_FF, E_F, MODAL_GAIN, FRAME_DEVIATION),
         (response, MODAL_ACCELERATIONS),
         (

@@ -203,7 +203,7 @@ def outward() -> Derivation:
         [[rotation.T, zero_block], [zero_block, end_rotation.T * _tangent_operator(1)]]
     )
     return _motion_derivation(
-        "end of a flexible body against its floating frame",
+        "end of a flexible body relative to its floating frame",
         (
             Equation("rotation", rotation, _rotation_matrix() * end_rotation),
             Equation("place", _OUTPUTS[1].symbol, row_entries(POSITION.symbol, 0)),
@@ -242,7 +242,7 @@ def inward() -> Derivation:
         - turn * relative_velocity
     )
     return _motion_derivation(
-        "floating frame against the end of the body that is held",
+        "floating frame relative to the supported end of the body",
         (
             Equation("rotation", rotation, end_rotation.T * _rotation_matrix().T),
             Equation("place", _OUTPUTS[1].symbol, -rotation * POSITION.symbol),
@@ -254,9 +254,11 @@ def inward() -> Derivation:
     )
 
 
-def turn_guards() -> tuple[tuple[sp.Basic, int, str], ...]:
+def rotation_guards() -> tuple[tuple[sp.Basic, int, str], ...]:
     """Guards of the section rotation: range of the series and of the model."""
-    text = f"a section turns by more than {MAX_SECTION_ROTATION} rad against its floating frame"
+    text = (
+        f"a section rotates by more than {MAX_SECTION_ROTATION} rad relative to its floating frame"
+    )
     return ((SQUARE[0, 0] < MAX_SECTION_ROTATION**2, 1, text),)
 
 
@@ -273,7 +275,7 @@ def subspace() -> Derivation:
     )
 
 
-def imposed() -> Derivation:
+def prescribed_bias() -> Derivation:
     """Bias of a port with prescribed modal accelerations s: c + H s."""
     h = modal_columns("H", 6, "motion subspace of the modes")
     s = modal_vector("s", "prescribed modal accelerations")

@@ -60,14 +60,14 @@ class RowSlots(Slots):
 
     def row(self) -> RowStructure:
         """Current row."""
-        return self.state.structure.rows[self.at.row]
+        return self.state.structure.rows[self.subject.row]
 
-    def closed_by(self, kind: str) -> bool:
+    def has_closure(self, kind: str) -> bool:
         """Whether the current body has a closure of this kind."""
         closure = self.closure()
         return closure is not None and closure.kind == kind
 
-    def rests(self) -> bool:
+    def is_inactive(self) -> bool:
         """Whether the current row is inactive: no condition on it, or a zero pivot."""
         if self.level == "gaping" and self.row().of_speeds:
             return True
@@ -76,13 +76,13 @@ class RowSlots(Slots):
     def is_coupled(self) -> bool:
         """Whether the current row is a speed coupling that includes the current hinge."""
         return any(
-            coupling.row == self.at.row and self.index in dict(coupling.columns)
+            coupling.row == self.subject.row and self.index in dict(coupling.columns)
             for coupling in self.state.structure.couplings
         )
 
-    def met(self, of: str) -> Iterator[Subject]:
+    def subjects(self, of: str) -> Iterator[Subject]:
         """Subjects that a `ForEach` step visits."""
-        at, rows = self.at, self.state.structure.rows
+        at, rows = self.subject, self.state.structure.rows
         if of in ("closings", "openings"):
             rows_of_body = [
                 row_index for row_index, row in enumerate(rows) if row.body == self.index
@@ -118,7 +118,7 @@ class RowSlots(Slots):
                     yield replace(at, row=row_index, direction=direction)
 
     def _key(self, slot: str) -> Hashable:
-        at = self.at
+        at = self.subject
         if slot in _ENTRY_INDICES:
             return ("L", *sorted(getattr(at, field) for field in _ENTRY_INDICES[slot]))
         if slot in _COLUMN_SLOTS:
@@ -136,7 +136,7 @@ class RowSlots(Slots):
     def _scene_data(self, slot: str) -> Nodes:
         f = self.state
         if slot in _ENTRY_INDICES:
-            return self._entry(*(getattr(self.at, field) for field in _ENTRY_INDICES[slot]))
+            return self._entry(*(getattr(self.subject, field) for field in _ENTRY_INDICES[slot]))
         if slot == "row.floor":
             return f.entries(self.row().floor) or f.zeros(1)
         if slot in _COLUMN_SLOTS:

@@ -36,7 +36,7 @@ class FusionState:
         self.q = self.graph.vector("q", structure.nq)
         self.u = self.graph.vector("u", structure.nu)
         self.efforts = self.graph.vector("efforts", structure.nu)
-        self.given = self.graph.vector("a", structure.nu)
+        self.given_accelerations = self.graph.vector("a", structure.nu)
         self.memory = self.graph.vector("memory", structure.n_memory)
 
     def entries(self, entries: Entries) -> Nodes:

@@ -50,7 +50,7 @@ def fuse_implicit(structure: Structure, kernels: Kernels) -> FusedSceneIR:
     stores_derivatives = structure.nu <= _MAX_SPEEDS_STORED
     kernel_list = _ResidualKernels(structure, kernels).kernels(rest=not stores_derivatives)
     if stores_derivatives:
-        kernel_list += _ResidualKernels(structure, kernels).by_slopes()
+        kernel_list += _ResidualKernels(structure, kernels).matrix_kernels()
     kernel_list += [_solution_kernel(structure.nu), *_RateKernels(structure, kernels).kernels()]
     return FusedSceneIR(BalancedKernels(*kernel_list), ((0, -1, FAILED),))
 
@@ -122,7 +122,7 @@ class _CoordinateIncrements:
                 self._speed_of_coordinate |= {
                     body.modal.q + k: body.modal.u + k for k in range(body.modal.n)
                 }
-            rates = replay.filled(index, "body.qdot") or []
+            rates = replay.value(index, "body.qdot") or []
             first, speeds = q[body.q : body.q + body.nq], u[body.u : body.u + body.nu]
             slopes = [derivatives(rates, {variable: 1}) for variable in first]
             by_speeds = [derivatives(rates, {variable: 1}) for variable in speeds]
@@ -133,7 +133,7 @@ class _CoordinateIncrements:
                     (body.q, body.u, _transpose(slopes), _transpose(by_speeds))
                 )
 
-    def changes(self, x: Nodes, rho: Nodes | None) -> dict[int, Node]:
+    def coordinate_changes(self, x: Nodes, rho: Nodes | None) -> dict[int, Node]:
         """dq by coordinate index; coordinates that do not change are omitted."""
         increments = {}
         for index, speed in self._speed_of_coordinate.items():
@@ -180,7 +180,7 @@ class _RateKernels:
         self._structure = structure
         state = FusionState(structure, kernels, None)
         self._graph, self._increments = state.graph, _CoordinateIncrements(state)
-        self._rates = self._increments.replay.gathered("qdot")
+        self._rates = self._increments.replay.collect("qdot")
         for index in _prescribed_coordinates(structure):
             self._rates[index] = state.zero
 
@@ -195,7 +195,9 @@ class _RateKernels:
 
     def _coordinates_kernel(self) -> KernelIR:
         graph, s = self._graph, self._structure
-        changes = self._increments.changes(graph.vector("x", s.nu), graph.vector("rho", s.nq))
+        changes = self._increments.coordinate_changes(
+            graph.vector("x", s.nu), graph.vector("rho", s.nq)
+        )
         increment_ports = [Port("steps", (3,)), Port("x", (s.nu,)), Port("rho", (s.nq,))]
         dq = [changes.get(index, graph.constant(0)) for index in range(s.nq)]
         return graph.kernel(
@@ -215,10 +217,10 @@ class _ResidualKernels:
         state = FusionState(structure, kernels, None)
         state.efforts = state.zeros(structure.nu)
         self._graph, self._t, self._q, self._u = state.graph, state.t, list(state.q), list(state.u)
-        self._a, self._increments = state.given, _CoordinateIncrements(state)
+        self._a, self._increments = state.given_accelerations, _CoordinateIncrements(state)
         replay = ScheduleInterpreter(state, staged=False, inverse=True)
         replay.sweep(INVERSE_DYNAMICS)
-        required = replay.gathered("required")
+        required = replay.collect("required")
         terms = zip(required, state.u, self._is_prescribed, strict=True)
         self._power = sum(
             (load * speed for load, speed, imposed in terms if imposed),
@@ -241,7 +243,7 @@ class _ResidualKernels:
             graph.kernel("residual", ports, [r], {"r": self._r}, as_made=True),
             graph.kernel("residual_power", ports, [r, power], values, as_made=True),
             graph.kernel("residual_rate", ports, [Port("r_t", (s.nu,))], rate, as_made=True),
-            *([self._rest_kernel(ports)] if rest else []),
+            *([self._known_increments_kernel(ports)] if rest else []),
             self._tangent_kernel(ports),
         ]
 
@@ -260,11 +262,11 @@ class _ResidualKernels:
         if self._is_prescribed[j]:
             return unit
         seeds: dict[Node, Node | float] = {self._u[j]: 1, self._a[j]: self._increments.s}
-        for index, change in self._increments.changes(unit, None).items():
+        for index, change in self._increments.coordinate_changes(unit, None).items():
             seeds[self._q[index]] = change
         return derivatives(self._r, seeds)
 
-    def _rest_kernel(self, ports: list[Port]) -> KernelIR:
+    def _known_increments_kernel(self, ports: list[Port]) -> KernelIR:
         """Directional derivative of R along the known increments."""
         graph, s = self._graph, self._structure
         increments = [*graph.vector("dq", s.nq), *graph.vector("da", s.nu)]
@@ -278,7 +280,7 @@ class _ResidualKernels:
             as_made=True,
         )
 
-    def by_slopes(self) -> list[KernelIR]:
+    def matrix_kernels(self) -> list[KernelIR]:
         """Kernels that store K and M, and the tangent formed from them."""
         graph, s, ports = self._graph, self._structure, _inputs(self._structure)
         stored, by_speeds = (
@@ -293,7 +295,7 @@ class _ResidualKernels:
         tangent = graph.kernel(
             "tangent_slopes", [*ports, Port("steps", (3,))], ports_out, values, as_made=True
         )
-        return [tangent, self._stored_rest_kernel(ports, stored)]
+        return [tangent, self._stored_increments_kernel(ports, stored)]
 
     def _derivative_rows(self, leaves: Nodes) -> Matrix:
         """Derivatives of R, one row for each entry."""
@@ -305,13 +307,13 @@ class _ResidualKernels:
         unit = [graph.constant(int(i == j)) for i in range(s.nu)]
         if self._is_prescribed[j]:
             return unit
-        changes = {s.nq + j: self._increments.s, **self._increments.changes(unit, None)}
+        changes = {s.nq + j: self._increments.s, **self._increments.coordinate_changes(unit, None)}
         return [
             by_speed[j] + _product(graph, row, changes)
             for row, by_speed in zip(stored, by_speeds, strict=True)
         ]
 
-    def _stored_rest_kernel(self, ports: list[Port], stored: Matrix) -> KernelIR:
+    def _stored_increments_kernel(self, ports: list[Port], stored: Matrix) -> KernelIR:
         """Kernel "rest" from stored K and M; structural zeros are not read."""
         s, graph = self._structure, Graph()
         increments = [*graph.vector("dq", s.nq), *graph.vector("da", s.nu)]

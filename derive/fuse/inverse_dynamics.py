@@ -31,7 +31,7 @@ def fuse_inverse(structure: Structure, kernels: Kernels) -> FusedSceneIR:
         state.graph.guard(condition, FAILED, "the looped engine names what fails")
     inputs = [*inputs_of(structure)[:-1], Port("a", (structure.nu,))]
     outputs = [Port("required", (structure.nu,))]
-    values: dict[str, object] = {"required": replay.gathered("required")}
+    values: dict[str, object] = {"required": replay.collect("required")}
     kernel_list = [state.graph.kernel("required", inputs, outputs, values, as_made=True)]
     if not any(body.modal for body in structure.bodies):
         state = FusionState(structure, kernels, None)
@@ -70,10 +70,10 @@ class _Composition:
             self._replay.fill("body.given", self._zeros(bodies[i].nu))
         self._enter(index)
         self._replay.fill(f"body.given[{speed}]", [self._one])
-        self._run_at(EXERTED, index)
+        self._run_pass_at(EXERTED, index)
         pairs = []
         for i in path:
-            self._run_at(FELT_BY, i)
+            self._run_pass_at(FELT_BY, i)
             loads = self._replay.get("body.required", bodies[i].nu)
             pairs += [(bodies[i].u + k, load) for k, load in enumerate(loads)]
         return pairs
@@ -81,6 +81,6 @@ class _Composition:
     def _enter(self, index: int) -> None:
         self._replay.enter(self._replay.body_subject(index))
 
-    def _run_at(self, body_pass: Pass, index: int) -> None:
+    def _run_pass_at(self, body_pass: Pass, index: int) -> None:
         self._enter(index)
         self._replay.steps(body_pass.steps)

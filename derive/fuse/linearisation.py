@@ -34,8 +34,10 @@ def fuse_linear(
     """
     scene, n = _StateDerivatives(structure, kernels, free), len(free)
     values = scene.slopes()
-    values["N"] = _rows_of_columns(scene.moves)
-    values["P"] = [scene.along("p", index, effort) for effort in scene.r for index in numbers]
+    values["N"] = _rows_of_columns(scene.coordinate_motions)
+    values["P"] = [
+        scene.input_derivative("p", index, effort) for effort in scene.r for index in numbers
+    ]
     outputs = [
         *(Port(name, (n, n)) for name in "MCK"), Port("N", (structure.nq, n)),
         Port("P", (n * len(numbers),)),
@@ -62,8 +64,8 @@ def fuse_slopes(structure: Structure, kernels: Kernels) -> FusedSceneIR:
     for condition in scene.conditions:
         scene.graph.guard(condition, FAILED, "the looped engine names what fails")
     values = scene.slopes()
-    values["G"] = scene.turning()
-    values["r_t"] = [scene.along("t", 0, effort) for effort in scene.r]
+    values["G"] = scene.rate_matrices()
+    values["r_t"] = [scene.input_derivative("t", 0, effort) for effort in scene.r]
     outputs = [*(Port(name, (n, n)) for name in "MCKG"), Port("r_t", (n,))]
     kernel = scene.graph.kernel("linear", _inputs(structure), outputs, values, as_made=True)
     kernel_map = {"accelerations": fuse(structure, kernels).kernels["accelerations"]}
@@ -74,7 +76,7 @@ def fuse_required(structure: Structure, kernels: Kernels) -> KernelIR:
     """Kernel "required": efforts R (nu) by inverse dynamics; inputs as in `fuse_linear`."""
     state = FusionState(structure, kernels, None)
     outputs = [Port("required", (structure.nu,))]
-    values: dict[str, object] = {"required": _inverse_dynamics(state).gathered("required")}
+    values: dict[str, object] = {"required": _inverse_dynamics(state).collect("required")}
     return state.graph.kernel("required", _inputs(structure), outputs, values, as_made=True)
 
 
@@ -84,17 +86,17 @@ class _StateDerivatives:
     def __init__(self, structure: Structure, kernels: Kernels, free: Sequence[int]) -> None:
         state = FusionState(structure, kernels, None)
         self.graph, self._structure, self._free = state.graph, structure, list(free)
-        self._q, self._u, self._a = list(state.q), list(state.u), list(state.given)
+        self._q, self._u, self._a = list(state.q), list(state.u), list(state.given_accelerations)
         rates = ScheduleInterpreter(state, staged=False)
         rates.sweep(RATES)
-        self._rates = rates.gathered("qdot")
-        self.moves = [derivatives(self._rates, {self._u[j]: 1}) for j in free]
+        self._rates = rates.collect("qdot")
+        self.coordinate_motions = [derivatives(self._rates, {self._u[j]: 1}) for j in free]
         replay = _inverse_dynamics(state)
         self.conditions = replay.conditions
-        required = replay.gathered("required")
+        required = replay.collect("required")
         self.r = [required[j] for j in free]
 
-    def along(self, port: str, index: int, node: Node) -> Node:
+    def input_derivative(self, port: str, index: int, node: Node) -> Node:
         """Derivative of a node by one entry of an input."""
         return derivative(node, {self.graph.element(port, index): 1})
 
@@ -106,18 +108,24 @@ class _StateDerivatives:
             "M": [[half[min(i, j)][abs(i - j)] for j in n] for i in n],
             "C": _rows_of_columns([derivatives(self.r, {self._u[j]: 1}) for j in self._free]),
             "K": _rows_of_columns(
-                [derivatives(self.r, self._coordinate_seeds(move)) for move in self.moves]
+                [
+                    derivatives(self.r, self._coordinate_seeds(move))
+                    for move in self.coordinate_motions
+                ]
             ),
         }
 
-    def turning(self) -> list[Nodes]:
+    def rate_matrices(self) -> list[Nodes]:
         """G by hinge: for q(t) + N x, N x' = (q'_q N - N') x + N du."""
         n, position = len(self._free), {j: k for k, j in enumerate(self._free)}
         rows = [[self.graph.constant(0)] * n for _ in range(n)]
         for body in self._structure.bodies:
             columns = [position[j] for j in range(body.u, body.u + body.nu) if j in position]
-            moves = [self.moves[k][body.q : body.q + body.nq] for k in columns]
-            rates = [self._subspace_rate(self.moves[k])[body.q : body.q + body.nq] for k in columns]
+            moves = [self.coordinate_motions[k][body.q : body.q + body.nq] for k in columns]
+            rates = [
+                self._subspace_rate(self.coordinate_motions[k])[body.q : body.q + body.nq]
+                for k in columns
+            ]
             if not any(x.value != 0 for column in rates for x in column):
                 continue
             square = [[_dot_product(a, b) for b in moves] for a in moves]

@@ -42,7 +42,7 @@ def slips(state: FusionState, inputs: list[Port]) -> KernelIR:
         share = replay.get("row.floor", 1)[0] * replay.get("row.inverse", 1)[0]
         strain = state.graph.call("max", strain, share)
     outputs = [Port("du", (state.structure.nu,)), Port("strain", (1,))]
-    values: dict[str, object] = {"du": replay.gathered("udot"), "strain": [strain]}
+    values: dict[str, object] = {"du": replay.collect("udot"), "strain": [strain]}
     return state.graph.kernel("slips", inputs, outputs, values, as_made=True)
 
 
@@ -59,13 +59,13 @@ def gaps(state: FusionState, inputs: list[Port]) -> KernelIR:
     for item, lack in replay.lacks:
         replay.enter(row_subject(state.structure.rows, item.row))
         pairs += [_split_error(replay, item.row, lack), *[(state.zero, state.zero)] * 5]
-    state.u = replay.gathered("udot")
+    state.u = replay.collect("udot")
     increments = ScheduleInterpreter(state)
     increments.sweep(_INCREMENTS)
     outputs = [Port("dq", (state.structure.nq,)), Port("gap", (len(pairs),)),
                Port("apart", (len(pairs),))]  # fmt: skip
     values: dict[str, object] = {
-        "dq": increments.gathered("qdot"),
+        "dq": increments.collect("qdot"),
         "gap": [gap for gap, _ in pairs], "apart": [repeated for _, repeated in pairs],
     }  # fmt: skip
     return state.graph.kernel("gaps", inputs, outputs, values, as_made=True)

@@ -61,13 +61,13 @@ def fuse(
     replay = ScheduleInterpreter(state)
     replay.sweep(ACCELERATIONS)
     for _ in range(s.refines):  # same pivots as in the first solution: their nodes are shared
-        state.given = replay.gathered("udot")
+        state.given_accelerations = replay.collect("udot")
         replay = ScheduleInterpreter(state, refined=True)
         replay.sweep(ACCELERATIONS)
     outputs = [Port("qdot", (s.nq,)), Port("udot", (s.nu,))]
     sums = [Port("power", (1,)), Port("potential", (1,))]
     values: dict[str, object] = {
-        "qdot": replay.gathered("qdot"), "udot": replay.gathered("udot"),
+        "qdot": replay.collect("qdot"), "udot": replay.collect("udot"),
     }  # fmt: skip
     power: dict[str, object] = {port.name: replay.get(f"sums.{port.name}", 1) for port in sums}
     kernel_list = [state.graph.kernel("accelerations", inputs_of(s), outputs, values, as_made=True)]
@@ -106,7 +106,7 @@ def fuse_solution(structure: Structure, kernels: Kernels) -> KernelIR:
         "solution",
         [*inputs_of(s), Port("column", (s.nu,))],
         [Port("answer", (s.nu + 1,))],
-        {"answer": [*replay.gathered("answer"), holds]},
+        {"answer": [*replay.collect("answer"), holds]},
         as_made=True,
     )
     return balance(solution)

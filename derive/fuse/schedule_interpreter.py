@@ -86,7 +86,7 @@ class ScheduleInterpreter(RowSlots):
         subjects = self._subjects(body_pass)
         for subject in reversed(subjects) if body_pass.order == TIPS_TO_ROOT else subjects:
             self.enter(subject)
-            if not (body_pass.skip and self._holds(body_pass.skip)):
+            if not (body_pass.skip and self._is_true(body_pass.skip)):
                 self.steps(body_pass.steps)
 
     def _subjects(self, body_pass: Pass) -> list[Subject]:
@@ -154,7 +154,7 @@ class ScheduleInterpreter(RowSlots):
 
     # --- traits ---------------------------------------------------------------------------------
 
-    def _holds(self, when: str) -> bool:
+    def _is_true(self, when: str) -> bool:
         return all(
             self._has(word.lstrip("!")) == (not word.startswith("!")) for word in when.split()
         )
@@ -180,18 +180,18 @@ class ScheduleInterpreter(RowSlots):
         if trait in ("gaping", "slipping"):
             return self.level == trait
         if trait == "coordinate":
-            return self.at.law is not None and not self.at.law.axes
+            return self.subject.law is not None and not self.subject.law.axes
         if trait == "unmet":
-            return self.at.row < 0
+            return self.subject.row < 0
         if trait == "effort":
-            return self.at.force is not None and self.at.force.effort is not None
+            return self.subject.force is not None and self.subject.force.effort is not None
         return _TRAITS[trait](self, self.body)
 
-    def free(self) -> list[int]:
+    def free_speeds(self) -> list[int]:
         """Speeds of the current hinge that are not prescribed."""
         return [k for k in range(self.body.nu) if not self.body.imposed[k]]
 
-    def own_elimination(self) -> bool:
+    def has_own_elimination(self) -> bool:
         """Whether the hinge's own elimination applies; old definitions have none."""
         body = self.body
         if any(body.imposed) or any(x.value != 0 for x in self.get("body.rotor", 0)):
@@ -207,7 +207,7 @@ class ScheduleInterpreter(RowSlots):
     def steps(self, steps: Iterable[Step]) -> None:
         """Execute steps of a pass for the current subject."""
         for step in steps:
-            if not step.when or self._holds(step.when):
+            if not step.when or self._is_true(step.when):
                 _EXECUTE[type(step)](self, step)
 
     def _run_steps(self, step: RunPass) -> None:
@@ -215,11 +215,11 @@ class ScheduleInterpreter(RowSlots):
         self.steps(step.whole.steps)
 
     def _for_each(self, step: ForEach) -> None:
-        at, local = self.at, self.local
-        for subject in self.met(step.of):
-            self.at = subject
+        at, local = self.subject, self.local
+        for subject in self.subjects(step.of):
+            self.subject = subject
             self.steps(_with_entry(inner, "c", subject.direction) for inner in step.steps)
-        self.at, self.local = at, local
+        self.subject, self.local = at, local
 
     def _rows_begun(self) -> None:
         """Compute the errors of couplings; other row slots are initialised on first use."""
@@ -253,20 +253,20 @@ class ScheduleInterpreter(RowSlots):
         if element in ("hinge", "body"):
             key = getattr(self.body, element)
         elif element == "law":
-            assert self.at.law is not None
-            key, kernel = ("sweep", "laws"), self.at.law.kernel
+            assert self.subject.law is not None
+            key, kernel = ("sweep", "laws"), self.subject.law.kernel
         elif element == "force":
-            assert self.at.force is not None
-            key = self.at.force.element
+            assert self.subject.force is not None
+            key = self.subject.force.element
         elif element.startswith("generic{"):
-            count = self.body.nu if element == "generic{nu}" else len(self.free())
+            count = self.body.nu if element == "generic{nu}" else len(self.free_speeds())
             key = ("sweep", f"generic{count}")
         return self.state.kernels(key, kernel)
 
     def _guard(self, reason: str) -> Callable[[Node, int], None] | None:
         if not reason:
             return None
-        element = self.index if self.index >= 0 else self.at.index
+        element = self.index if self.index >= 0 else self.subject.index
 
         def guard(condition: Node, code: int) -> None:
             if not self.staged:
@@ -302,7 +302,7 @@ class ScheduleInterpreter(RowSlots):
         for _ in range(abs(step.times) - 1):
             terms = [a + b for a, b in zip(terms, self.get(step.source, 0), strict=True)]
         if step.to == "law.tau":
-            law = self.at.law
+            law = self.subject.law
             assert law is not None
             self._add_at("body.tau", law.speed, terms)
             return
@@ -320,11 +320,11 @@ class ScheduleInterpreter(RowSlots):
 
     def _select_columns(self, step: SelectColumns) -> None:
         source, nu = self.get(step.source, 0), self.body.nu
-        picked = [source[row * nu + k] for row in range(step.rows) for k in self.free()]
+        picked = [source[row * nu + k] for row in range(step.rows) for k in self.free_speeds()]
         self.fill(step.to, picked)
 
     def _scatter_speeds(self, step: ScatterSpeeds) -> None:
-        free, nu = self.free(), self.body.nu
+        free, nu = self.free_speeds(), self.body.nu
         values = self.get(step.imposed, nu) if step.imposed else self.state.zeros(nu)
         rates = self.get(step.free, len(free)) if free else []
         values = list(values)
@@ -334,13 +334,13 @@ class ScheduleInterpreter(RowSlots):
 
     def _gather(self, step: Gather) -> None:
         owner, _, name = step.places.partition(".")
-        indices: tuple[int, ...] = getattr(getattr(self.at, owner), name)
+        indices: tuple[int, ...] = getattr(getattr(self.subject, owner), name)
         values = [self._values[index] if index >= 0 else self.state.zero for index in indices]
         self.fill(step.to, values)
 
     def _evaluate(self, step: Evaluate) -> None:
         owner, _, name = step.expression.partition(".")
-        expression: ExpressionStructure = getattr(getattr(self.at, owner), name)
+        expression: ExpressionStructure = getattr(getattr(self.subject, owner), name)
         inputs = {port: self.get(slot, 0) for port, slot in step.given}
         self.fill(step.to, self.state.expression(expression, **inputs))
 
@@ -380,7 +380,7 @@ class ScheduleInterpreter(RowSlots):
 
     def _check_pivots(self, step: CheckPivots) -> None:
         """Guard pivots relative to the body's own inertia, or the composite one if zero."""
-        graph, count = self.state.graph, len(self.free())
+        graph, count = self.state.graph, len(self.free_speeds())
         own, composite = self.get(step.own, 21), self.get(step.whole, 21)
         columns = self.get(step.subspace, 6 * count)
         mass, inertia = (
@@ -428,8 +428,8 @@ _TRAITS: dict[str, Callable[[ScheduleInterpreter, BodyStructure], bool]] = {
     "whole": lambda replay, body: False,
     "staged": lambda replay, body: replay.staged,
     "axial": _is_axial,
-    "special": lambda replay, body: replay.own_elimination(),
-    "free": lambda replay, body: bool(replay.free()),
+    "special": lambda replay, body: replay.has_own_elimination(),
+    "free": lambda replay, body: bool(replay.free_speeds()),
     "imposed": lambda replay, body: any(body.imposed),
     "hung": lambda replay, body: body.parent >= 0,
     "link": lambda replay, body: bool(body.link),
@@ -439,20 +439,20 @@ _TRAITS: dict[str, Callable[[ScheduleInterpreter, BodyStructure], bool]] = {
     "section": lambda replay, body: body.section is not None,
     "outward": lambda replay, body: body.section is not None and not body.section.inward,
     "drag": lambda replay, body: body.modal is not None and bool(body.modal.drag),
-    "moving": lambda replay, body: body.section is None and bool(replay.free()),
+    "moving": lambda replay, body: body.section is None and bool(replay.free_speeds()),
     "cut": lambda replay, body: replay.closure() is not None,
     "aside": lambda replay, body: body.idle or replay.closure() is not None,
     "coupled": lambda replay, body: replay.is_coupled(),
-    "hinged": lambda replay, body: replay.closed_by("hinge"),
-    "distance": lambda replay, body: replay.closed_by("distance"),
-    "plane": lambda replay, body: replay.closed_by("plane"),
-    "rolling": lambda replay, body: replay.closed_by("rolling"),
+    "hinged": lambda replay, body: replay.has_closure("hinge"),
+    "distance": lambda replay, body: replay.has_closure("distance"),
+    "plane": lambda replay, body: replay.has_closure("plane"),
+    "rolling": lambda replay, body: replay.has_closure("rolling"),
     "placing": lambda replay, body: False,
     "kept": lambda replay, body: not replay.level,
     "corrected": lambda replay, body: bool(replay.level),
     "soft": lambda replay, body: bool(replay.row().soft),
     "inside": lambda replay, body: replay.row().body >= 0,
-    "unmoved": lambda replay, body: replay.rests(),
+    "unmoved": lambda replay, body: replay.is_inactive(),
 }
 
 _EXECUTE: dict[type, Callable[..., None]] = {

@@ -48,26 +48,28 @@ class Slots:
 
     def __init__(self, state: FusionState) -> None:
         self.state = state
-        self._filled: dict[Hashable, Nodes] = {}
+        self._nodes_by_slot: dict[Hashable, Nodes] = {}
         self.local: dict[str, Nodes] = {}
-        self.at = Subject({})
+        self.subject = Subject({})
         gravity = [-g for g in state.entries(state.structure.gravity)]
         initial = {"A": state.identity(), "motion": [*state.zeros(6), *gravity]}
         sizes = {"x": 3, "v": 3, "delta": 6, "e": 6, "S": 21}
         initial |= {name: state.zeros(size) for name, size in sizes.items()}
-        self._filled |= {(GROUND, f"body.{name}"): nodes for name, nodes in initial.items()}
-        self._filled[0, "sums.power"] = self._filled[0, "sums.potential"] = [state.zero]
+        self._nodes_by_slot |= {(GROUND, f"body.{name}"): nodes for name, nodes in initial.items()}
+        self._nodes_by_slot[0, "sums.power"] = self._nodes_by_slot[0, "sums.potential"] = [
+            state.zero
+        ]
 
     # --- the subject ----------------------------------------------------------------------------
 
     def enter(self, subject: Subject) -> None:
         """Make `subject` the one that slots refer to."""
-        self.at, self.local = subject, {}
+        self.subject, self.local = subject, {}
 
     @property
     def index(self) -> int:
         """Index of the current body."""
-        return self.at.roles["body"]
+        return self.subject.roles["body"]
 
     @property
     def body(self) -> BodyStructure:
@@ -105,9 +107,9 @@ class Slots:
         if slot.startswith("local."):
             return self.local[slot]
         key = self._key(slot)
-        if key not in self._filled:
-            self._filled[key] = self._scene_data(slot)
-        return self._filled[key]
+        if key not in self._nodes_by_slot:
+            self._nodes_by_slot[key] = self._scene_data(slot)
+        return self._nodes_by_slot[key]
 
     def fill(self, slot: str, nodes: Nodes) -> None:
         """Store nodes in a slot, or in the entries named in brackets."""
@@ -122,11 +124,11 @@ class Slots:
         elif name in ("drive.q", "drive.u", "drive.s"):
             self._store_prescribed(name, nodes[0])
         else:
-            self._filled[self._key(name)] = nodes
+            self._nodes_by_slot[self._key(name)] = nodes
 
     def _store_prescribed(self, slot: str, node: Node) -> None:
         """Store a prescribed coordinate, speed or acceleration in the state vectors."""
-        f, speed = self.state, self.state.structure.driven[self.at.index][1]
+        f, speed = self.state, self.state.structure.driven[self.subject.index][1]
         if slot == "drive.s":
             self.fill(f"body.s[{speed}]", [node])
         elif slot == "drive.q":
@@ -134,33 +136,33 @@ class Slots:
         else:
             f.u[self.body.u + speed] = node
 
-    def filled(self, index: int, slot: str) -> Nodes | None:
+    def value(self, index: int, slot: str) -> Nodes | None:
         """Nodes stored in a slot of a body; None if it is empty."""
-        return self._filled.get((index, slot))
+        return self._nodes_by_slot.get((index, slot))
 
-    def gathered(self, name: str) -> Nodes:
+    def collect(self, name: str) -> Nodes:
         """Slot `name` of all bodies and their modes, in the order of the state."""
         s = self.state.structure
         vector = self.state.zeros(s.nq if name == "qdot" else s.nu)
         for index, body in enumerate(s.bodies):
             first = body.q if name == "qdot" else body.u
-            nodes = self.filled(index, f"body.{name}") or []
+            nodes = self.value(index, f"body.{name}") or []
             vector[first : first + len(nodes)] = nodes
             if body.modal is not None:
                 first = body.modal.q if name == "qdot" else body.modal.u
-                vector[first : first + body.modal.n] = self.filled(index, f"modes.{name}") or []
+                vector[first : first + body.modal.n] = self.value(index, f"modes.{name}") or []
         return vector
 
     def _key(self, slot: str) -> Hashable:
         owner, _, name = slot.partition(".")
         if owner in ROLES:
-            return self.at.roles[owner], f"body.{name}"
+            return self.subject.roles[owner], f"body.{name}"
         if owner in ("modes", "moments", "drag"):
             return self.frame, slot
         if owner in ("sums", "scene"):
             return 0, slot
         if owner in ("law", "load", "force", "drive", "speed"):
-            return self.at.index, slot
+            return self.subject.index, slot
         return self.index, slot
 
     # --- scene data ------------------------------------------------------------------------------
@@ -179,7 +181,7 @@ class Slots:
         if name == "q":
             return f.q[q]
         if name in ("u", "efforts", "column", "given"):
-            return {"u": f.u, "given": f.given}.get(name, f.efforts)[u]
+            return {"u": f.u, "given": f.given_accelerations}.get(name, f.efforts)[u]
         if name in ("chosen", "answer", "required"):
             return f.zeros(body.nu)
         return f.entries({"p": body.body_p, "rotor": body.rotor}[name])
@@ -215,7 +217,7 @@ class Slots:
             return f.entries(modal.stiffness if name == "K" else modal.damping)
         if name == "eta":
             return f.q[modal.q : modal.q + modal.n]
-        source = {"etad": f.u, "given": f.given}.get(name, f.efforts)
+        source = {"etad": f.u, "given": f.given_accelerations}.get(name, f.efforts)
         return source[modal.u : modal.u + modal.n]
 
     def _moments(self, name: str) -> Nodes:
@@ -235,7 +237,7 @@ class Slots:
         return self.state.entries(dict(numbers)[name])
 
     def _law(self, name: str) -> Nodes:
-        f, law, body = self.state, self.at.law, self.body
+        f, law, body = self.state, self.subject.law, self.body
         assert law is not None
         if name == "turn":
             return [f.memory[law.twist]]
@@ -247,15 +249,15 @@ class Slots:
         return f.q[q : q + (law.n if not law.axes else law.n + 1)]
 
     def _load(self, name: str) -> Nodes:
-        assert self.at.load is not None
-        return self.state.entries(getattr(self.at.load, name))
+        assert self.subject.load is not None
+        return self.state.entries(getattr(self.subject.load, name))
 
     def _force(self, name: str) -> Nodes:
-        assert self.at.force is not None
-        return self.state.entries(getattr(self.at.force, name.lower()))
+        assert self.subject.force is not None
+        return self.state.entries(getattr(self.subject.force, name.lower()))
 
     def _speed(self, name: str) -> Nodes:
-        return [(self.state.u if name == "u" else self.state.efforts)[self.at.index]]
+        return [(self.state.u if name == "u" else self.state.efforts)[self.subject.index]]
 
     def _scene(self, name: str) -> Nodes:
         assert name == "t"

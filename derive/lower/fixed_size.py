@@ -53,8 +53,8 @@ class Lowering:
 
     def __init__(self, derivation: Derivation) -> None:
         self.graph = Graph()
-        self.known: dict[str, NodeMatrix] = {
-            q.name: self._input(q) for q in derivation.inputs if not q.sized
+        self.values: dict[str, NodeMatrix] = {
+            q.name: self._input(q) for q in derivation.inputs if not q.has_runtime_size
         }
         self._scalars: dict[sp.Basic, Node] = {}
 
@@ -73,12 +73,12 @@ class Lowering:
         if equation.symmetric:
             for i, row in enumerate(value):
                 row[:i] = [value[j][i] for j in range(i)]
-        self.known[str(equation.left.name)] = value
+        self.values[str(equation.left.name)] = value
 
-    def stored(self, quantity: Quantity) -> list[object]:
+    def stored_entries(self, quantity: Quantity) -> list[object]:
         if quantity.rows * quantity.columns == 0:  # A hinge without speeds has empty gains.
             return [] if quantity.columns == 1 else [[] for _ in range(quantity.rows)]
-        value = self.known[quantity.name]
+        value = self.values[quantity.name]
         if quantity.symmetric:
             return [value[i][j] for i in range(quantity.rows) for j in range(i, quantity.rows)]
         if quantity.columns == 1:
@@ -111,7 +111,7 @@ class Lowering:
         raise NotImplementedError(f"cannot lower the matrix expression {expression}")
 
     def _symbol(self, symbol: sp.MatrixSymbol) -> NodeMatrix:
-        return [list(row) for row in self.known[str(symbol.name)]]
+        return [list(row) for row in self.values[str(symbol.name)]]
 
     def _explicit(self, matrix: sp.MatrixBase) -> NodeMatrix:
         return [[self.scalar(e) for e in matrix.row(i)] for i in range(matrix.rows)]
@@ -177,7 +177,7 @@ class Lowering:
 
     def _triangular(self, expression: Triangular) -> NodeMatrix:
         factor, right = self.matrix(expression.factor), self.matrix(expression.right)
-        substitute = back_substitute if expression.transposed else forward_substitute
+        substitute = back_substitute if expression.is_transposed else forward_substitute
         return _transpose([substitute(factor, list(c)) for c in zip(*right, strict=True)])
 
     # --- scalars --------------------------------------------------------------------------
@@ -216,7 +216,7 @@ class Lowering:
     def _entry(self, e: sp.Basic) -> Node:
         parent = e.parent
         if isinstance(parent, sp.MatrixSymbol):
-            return self.known[str(parent.name)][int(e.i)][int(e.j)]
+            return self.values[str(parent.name)][int(e.i)][int(e.j)]
         return self.matrix(parent)[int(e.i)][int(e.j)]
 
     def _fold(self, e: sp.Basic) -> Node:

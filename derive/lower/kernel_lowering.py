@@ -12,9 +12,7 @@ from .variable_size import SizedLowering
 
 
 def lower(
-    derivation: Derivation,
-    name: str,
-    guards: tuple[tuple[sp.Basic, int, str], ...] = (),
+    derivation: Derivation, name: str, guards: tuple[tuple[sp.Basic, int, str], ...] = ()
 ) -> KernelIR:
     """KernelIR of the derivation's definitions.
 
@@ -29,7 +27,7 @@ def lower(
     for condition, code, message in guards:
         lowering.graph.guard(lowering.scalar(condition), code, message)
     values: dict[str, object] = {
-        q.name: lowering.stored(q) for q in derivation.outputs if not q.sized
+        q.name: lowering.stored_entries(q) for q in derivation.outputs if not q.has_runtime_size
     }
     return lowering.graph.kernel(
         name,

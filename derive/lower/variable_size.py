@@ -41,11 +41,13 @@ class SizedLowering(Lowering):
         self.outputs = {q.name: q for q in derivation.outputs}
         self.ports: dict[str, Port] = {q.name: port(q) for q in derivation.inputs}
         self.entries: dict[str, Entries] = {
-            q.name: self._in_memory(self.ports[q.name]) for q in derivation.inputs if q.sized
+            q.name: self._memory_entries(self.ports[q.name])
+            for q in derivation.inputs
+            if q.has_runtime_size
         }
         self._entry_nodes: dict[tuple[sp.Basic, Index, Index], Node] = {}
         self._matrices: dict[sp.Basic, NodeMatrix] = {}
-        self._fixed: dict[sp.Basic, bool] = {}
+        self._is_fixed_cache: dict[sp.Basic, bool] = {}
 
     # --- definitions ----------------------------------------------------------------------------
 
@@ -74,9 +76,9 @@ class SizedLowering(Lowering):
 
     def _remember(self, stored: Port) -> None:
         self.ports[stored.name] = stored
-        self.entries[stored.name] = self._in_memory(stored)
+        self.entries[stored.name] = self._memory_entries(stored)
 
-    def _in_memory(self, stored: Port) -> Entries:
+    def _memory_entries(self, stored: Port) -> Entries:
         if len(stored.shape) == 1:
             return lambda i, j: self.graph.element(stored.name, i)
         return lambda i, j: self.graph.element(stored.name, i, j)
@@ -120,9 +122,11 @@ class SizedLowering(Lowering):
 
     def _is_fixed(self, expression: sp.Basic) -> bool:
         """Whether no part of an expression has the run-time size."""
-        is_fixed = self._fixed.get(expression)
+        is_fixed = self._is_fixed_cache.get(expression)
         if is_fixed is None:
-            is_fixed = self._fixed[expression] = self.size not in expression.atoms(sp.Symbol)
+            is_fixed = self._is_fixed_cache[expression] = self.size not in expression.atoms(
+                sp.Symbol
+            )
         return is_fixed
 
     def _scalar(self, e: sp.Basic) -> Node:

@@ -23,8 +23,8 @@ from .pass_steps import (
     SelectColumns,
     Sweep,
     call,
-    elsewhere,
     only,
+    with_renamed_slots,
 )
 from .tangent_sweep import HINGE_CHANGE, KNOWN_LAWS, LAW_CHANGE
 
@@ -63,7 +63,7 @@ LAWS_OWN = Pass(
 )  # fmt: skip
 
 LAWS_RATES = Pass(
-    "laws_rates", "body", "Rates of the coordinates by each of the speeds.",
+    "laws_rates", "body", "Derivatives of the coordinate rates by each speed.",
     (
         ForEachDirection(
             of="rates",
@@ -79,7 +79,7 @@ LAWS_RATES = Pass(
 LAWS_OWN_SLOPES = Pass(
     "laws_own_slopes",
     "law",
-    "Slopes of a law along the unknowns of its speeds.",
+    "Derivatives of a law along the unknowns of its speeds.",
     (
         ForEachDirection(
             of="law", steps=(*LAW_CHANGE, Add(to="law.own_slopes", source=D + "local.tau"))
@@ -87,7 +87,7 @@ LAWS_OWN_SLOPES = Pass(
     ),
 )
 
-_factorise = elsewhere(FACTORISE, _NAME, _SLOTS)
+_factorise = with_renamed_slots(FACTORISE, _NAME, _SLOTS)
 LAWS_FACTORISE = Pass(
     _factorise.name, "body", "Mass matrices with laws carried to the root.",
     (
@@ -100,7 +100,7 @@ LAWS_FACTORISE = Pass(
 
 LAWS_ALONE = Sweep(
     "laws_alone",
-    "The mass matrix and the slopes of laws factored, behind inverse dynamics.",
+    "Mass matrix and derivatives of laws factored, after inverse dynamics.",
     (
         Run(whole=LAWS_OWN),
         Run(whole=LAWS_RATES, when="laws"),
@@ -112,7 +112,7 @@ LAWS_ALONE = Sweep(
 # --- one right-hand side ------------------------------------------------------------------------
 
 MODES_CHANGE = Pass(
-    "modes_change", "body", "Change of the modes' load by increments that are known.",
+    "modes_change", "body", "Change of the modal loads due to known increments.",
     (
         call("modal.strained", K="modes.K", D="modes.D", eta=D + "modes.eta",
              etad=D + "modes.etad", e_f=D + "modes.e_f"),
@@ -122,18 +122,18 @@ MODES_CHANGE = Pass(
 
 LAWS_SOLUTION = Sweep(
     "laws_solution",
-    "One right-hand side through the mass matrix with laws.",
+    "One right-hand side solved with the mass matrix and laws.",
     (
-        Run(whole=elsewhere(COLUMN, _NAME, _SLOTS)),
+        Run(whole=with_renamed_slots(COLUMN, _NAME, _SLOTS)),
         Run(whole=KNOWN_LAWS, when="shifted laws"),
         Run(whole=MODES_CHANGE, when="shifted flexible"),
-        Run(whole=elsewhere(COLUMN_CARRIED, _NAME, _SLOTS)),
-        Run(whole=elsewhere(COLUMN_ANSWERED, _NAME, _SLOTS)),
+        Run(whole=with_renamed_slots(COLUMN_CARRIED, _NAME, _SLOTS)),
+        Run(whole=with_renamed_slots(COLUMN_ANSWERED, _NAME, _SLOTS)),
     ),
 )
 
 RATES_CHANGE = Pass(
-    "rates_change", "body", "Change of a hinge's rates by that of its coordinates and speeds.",
+    "rates_change", "body", "Change of the rates of a hinge by that of its coordinates and speeds.",
     (
         RunPass(whole=HINGE_CHANGE),
         Copy(to="body.change", source=D + "body.qdot"),

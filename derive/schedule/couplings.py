@@ -12,10 +12,12 @@ from dataclasses import replace
 from .pass_steps import Add, EachSpeed, ForEach, Pass, Step, call, only
 
 #: Contribution of the accelerations of a tree hinge to the rows that name it.
-TOLD = call("generic{nu}.answered", when="coupled", y="body.s", z="pending.tau", l="pending.known")
+EFFORTS_TO_KNOWN = call(
+    "generic{nu}.answered", when="coupled", y="body.s", z="pending.tau", l="pending.known"
+)
 #: The same for the accelerations chosen in the bias motion.
-TOLD_OF_BIAS = replace(
-    TOLD, ports=(("y", "body.chosen"), ("z", "pending.tau"), ("l", "pending.known"))
+BIAS_EFFORTS_TO_KNOWN = replace(
+    EFFORTS_TO_KNOWN, ports=(("y", "body.chosen"), ("z", "pending.tau"), ("l", "pending.known"))
 )
 #: The same for a hinge that closes a loop: accelerations along its rows, and prescribed ones.
 _OWN_ROW_TERMS = (
@@ -23,7 +25,7 @@ _OWN_ROW_TERMS = (
     call("generic{nu}.answered", y="body.s", z="own.tau", l="own.known"),
 )
 #: Rows of couplings on a hinge's own speeds start on both sides of it.
-OF_OWN = ForEach(
+OWN_COUPLINGS = ForEach(
     of="own",
     steps=(
         EachSpeed(
@@ -36,13 +38,13 @@ OF_OWN = ForEach(
     ),
 )  # fmt: skip
 #: Additional contribution where the bias motion chooses accelerations.
-OF_OWN_BIAS = ForEach(
+OWN_COUPLINGS_BIAS = ForEach(
     of="own",
     when="staged !corrected",
     steps=(call("generic{nu}.answered", y="body.chosen", z="own.tau", l="own.known"),),
 )
 #: The same with known multipliers.
-OWN_TOLD = ForEach(of="own", steps=_OWN_ROW_TERMS)
+OWN_EFFORTS_TO_KNOWN = ForEach(of="own", steps=_OWN_ROW_TERMS)
 
 
 def efforts_of_own(x: str, when: str) -> ForEach:
@@ -60,14 +62,14 @@ def efforts_of(x: str, when: str, *more: Step) -> ForEach:
 #: Multipliers are known from an earlier evaluation of accelerations in this workspace.
 COUPLINGS_LOADED = Pass(
     "couplings_loaded", "body",
-    "Rows of couplings at the accelerations that are given, and the efforts of their multipliers.",
-    (efforts_of("pending.x", "", TOLD),),
+    "Rows of couplings at the given accelerations, and the efforts of their multipliers.",
+    (efforts_of("pending.x", "", EFFORTS_TO_KNOWN),),
     skip="aside",
 )  # fmt: skip
 
 COUPLINGS_ANSWERED = Pass(
     "couplings_answered", "coupling",
-    "Multipliers of couplings, and the power that those feed in whose values go by time.",
+    "Multipliers of couplings, and the power supplied by time-dependent couplings.",
     (
         Add(to="coupling.x", source="coupling.told", when="refined"),
         *only(

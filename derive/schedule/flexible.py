@@ -68,20 +68,20 @@ MODAL_CONDENSE = Pass(
 )  # fmt: skip
 
 #: Contribution of the bodies outboard of an end to the modes of the flexible body.
-ABSORBED = call(
+PORT_ASSEMBLY = call(
     "modal.absorb", Rc="hinge.R", r="hinge.d", H="section.H", S="body.S", e="body.e",
     U="section.push", S_rf="modes.S_rf", S_ff="modes.S_ff", e_f="modes.e_f",
 )  # fmt: skip
 
 #: Contribution of the modes to the deviation outboard of a section.
-DISPLACED = (
+PORT_MOTION = (
     call("modal.displaced", H="section.H", etadd="modes.etadd", delta_I="body.delta",
          delta="local.delta"),
     Copy(to="body.delta", source="local.delta"),
 )  # fmt: skip
 
 #: Modal efforts of the load on a section.
-FELT = (
+MODAL_EFFORT = (
     call("modal.modal_effort", H="section.H", e="body.e", e_f="modes.e_f", tau="modes.felt"),
     Copy(to="modes.e_f", source="modes.felt"),
 )
@@ -98,7 +98,7 @@ STRAIN = Pass(
 )  # fmt: skip
 
 DRAG = Pass(
-    "drag", "body", "Viscous drag of flexible bodies: momentum under the density of the drag.",
+    "drag", "body", "Viscous drag of flexible bodies: momentum with the drag as density.",
     (
         call("modal.momentum", **_DRAG, **_STATE, v="body.v", w="body.w", S="local.S",
              S_rf="modes.based", A="modes.A_drag", h="local.h", h_f="modes.felt", T="local.T"),

@@ -15,7 +15,7 @@ STILL = {
 COORDINATES = {"p": "hinge.p", "q": "body.q", "u": "body.u"}
 
 PRESCRIBED = Pass(
-    "prescribed", "body", "Accelerations that are given: all, or none so far.",
+    "prescribed", "body", "Given accelerations: all, or zero.",
     (
         Copy(to="body.s", source="body.given", when="inverse"),
         Copy(to="body.s", when="!inverse"),
@@ -24,7 +24,7 @@ PRESCRIBED = Pass(
 )  # fmt: skip
 
 DRIVES = Pass(
-    "drives", "drive", "Driven coordinates, speeds and accelerations filled in.",
+    "drives", "drive", "Prescribed coordinates, speeds and accelerations set.",
     (
         Copy(to="drive.q", source="drive.value"),
         Copy(to="drive.u", source="drive.rate"),

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from .flexible import FELT
+from .flexible import MODAL_EFFORT
 from .forward_kinematics import HINGE_MOTION
 from .pass_steps import TIPS_TO_ROOT, Copy, EachSpeed, Pass, RunPass, call, only
 
 #: Efforts of a load along the speeds of a hinge, and the load on the parent.
-FELT_ON_THE_WAY = (
+EFFORT_AND_TRANSPORT = (
     call("generic{nu}.effort", H="hinge.H", f="body.e", tau="local.tau"),
     EachSpeed(
         steps=(
@@ -19,12 +19,12 @@ FELT_ON_THE_WAY = (
 )  # fmt: skip
 
 REQUIRED = Pass(
-    "required", "body", "Efforts beyond the laws' own, and the load on the parent.",
+    "required", "body", "Efforts required beyond those of the laws, and the load on the parent.",
     (
-        *only("section", *FELT),
+        *only("section", *MODAL_EFFORT),
         Copy(to="modes.required", source="modes.e_f", when="modal"),
         RunPass(whole=HINGE_MOTION, when="own"),
-        *FELT_ON_THE_WAY,
+        *EFFORT_AND_TRANSPORT,
     ),
     order=TIPS_TO_ROOT, skip="idle",
 )  # fmt: skip

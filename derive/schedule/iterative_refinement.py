@@ -12,7 +12,7 @@ from dataclasses import replace
 from .pass_steps import Add, Copy, EachSpeed, Pass, call
 
 RESTATED = Pass(
-    "restated", "body", "Efforts without what rotors take of the accelerations in the answer.",
+    "restated", "body", "Efforts less those of the rotors at the accelerations of the solution.",
     (
         EachSpeed(
             steps=(

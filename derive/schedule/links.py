@@ -15,8 +15,8 @@ _BODY = {"b": "link.b", "p": "link.p"}
 LINK_TURN = Pass(
     "link_turn",
     "link",
-    "Rotation across the hinge; about z its angle, whose sine and cosine are"
-    " taken for two links at a time.",
+    "Rotation across the hinge; about z only its angle, because sines and cosines of two links"
+    " are computed together.",
     (call("link.turn", **_LINK, q="link.q"),),
 )
 
@@ -30,7 +30,7 @@ LINK_FORWARD = Pass(
 )  # fmt: skip
 
 LINK_CONDENSE = Pass(
-    "link_condense", "link", "S and e of what hangs on a link, and of the link itself, carried on.",
+    "link_condense", "link", "S and e of a link and its outboard part, carried to the parent.",
     (
         call("link.condense", fails="undetermined", **_LINK, d="link.shift", **_BODY,
              S_K="inner.S", e_K="inner.e", e_B="link.load", tau="link.tau", G="link.G",
@@ -40,7 +40,7 @@ LINK_CONDENSE = Pass(
 )  # fmt: skip
 
 LINK_RECOVER = Pass(
-    "link_recover", "link", "Acceleration of a link, and its deviation in place of its motion.",
+    "link_recover", "link", "Acceleration of a link, and its deviation, which replaces its motion.",
     (
         call("link.recover", **_LINK, d="link.shift", p="link.p", G="link.G", g="link.g",
              delta_I="outer.delta", udot="link.udot", delta="link.motion"),

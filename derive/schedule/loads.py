@@ -5,7 +5,7 @@ from __future__ import annotations
 from .pass_steps import Add, Copy, EachSpeed, Evaluate, Gather, Pass, Step, call
 
 EFFORTS = Pass(
-    "efforts", "body", "Efforts of the caller where the sweep reads them.",
+    "efforts", "body", "Efforts of the caller, copied to the slots of the sweep.",
     (
         Copy(to="body.tau", source="body.efforts", when="efforts"),
         Copy(to="body.tau", when="!efforts"),
@@ -98,7 +98,7 @@ FORCES = Pass(
 )  # fmt: skip
 
 DRIVE_POWER = Pass(
-    "drive_power", "body", "Power that drives and holds feed in.",
+    "drive_power", "body", "Power supplied by drives and locked hinges.",
     (
         call("frames.reaction", S="body.S", e="body.e", delta="body.delta", A="identity",
              f="local.f"),

@@ -9,8 +9,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from .couplings import OF_OWN, OF_OWN_BIAS, OWN_TOLD, TOLD, TOLD_OF_BIAS, efforts_of, efforts_of_own
-from .flexible import ABSORBED, DISPLACED, MODAL_CONDENSE
+from .couplings import (
+    BIAS_EFFORTS_TO_KNOWN,
+    EFFORTS_TO_KNOWN,
+    OWN_COUPLINGS,
+    OWN_COUPLINGS_BIAS,
+    OWN_EFFORTS_TO_KNOWN,
+    efforts_of,
+    efforts_of_own,
+)
+from .flexible import MODAL_CONDENSE, PORT_ASSEMBLY, PORT_MOTION
 from .forward_kinematics import HINGE_MOTION
 from .pass_steps import (
     TIPS_TO_ROOT,
@@ -28,14 +36,14 @@ from .pass_steps import (
     only,
 )
 from .riccati_sweep import (
+    ADD_TO_PARENT,
     BODY,
     FREE,
     FREE_EFFORTS,
-    HANDED_ON,
-    JUDGED,
     ONWARD,
+    PIVOT_CHECK,
     RECOVERED,
-    condensed,
+    eliminate_free_speeds,
     eliminate_with_effort,
 )
 
@@ -49,11 +57,11 @@ def _row(k: str) -> Call:
                 J_B=f"closure.J_B[6 * {k}]")  # fmt: skip
 
 
-def _known(relative: str, when: str) -> Call:
+def _known_rows_call(relative: str, when: str) -> Call:
     return call("loops.known", when=when, W="closure.W", relative=relative, l="closure.l")
 
 
-def _gap(when: str) -> tuple[Call, ...]:
+def _gap_calls(when: str) -> tuple[Call, ...]:
     return (call("loops.gap", when=when, R_e="closure.turn", R_C="closure.R_C", d="closure.d",
                  gap="closure.gap"),)  # fmt: skip
 
@@ -78,7 +86,9 @@ _DRIFT = call("loops.drift", **_END_PORTS, d="closure.d", slip="closure.slip",
               motion_C="body.motion", motion_B="outboard.motion",
               drift="local.drift")  # fmt: skip
 #: Alternative for steps that close gaps by accelerations.
-_CLOSING = call("loops.closing", gap="closure.gap", rate="step.closing", relative="local.relative")
+_REQUIRED_ACCELERATION = call(
+    "loops.closing", gap="closure.gap", rate="step.closing", relative="local.relative"
+)
 #: Terms of rotating directions.
 _DIRECTION_RATES = (
     call("loops.distance_drift", when="distance", d="closure.d", slip="closure.slip",
@@ -92,21 +102,25 @@ _EFFORTS = EachSpeed(
         _row("k"),
         call("loops.act", J="closure.J_A[6 * k]", tau="body.tau[k]", e="parent.e"),
         call("loops.act", J="closure.J_B[6 * k]", tau="body.tau[k]", e="outboard.e"),
-    ),
+    )
 )
 
 CLOSURES = Pass(
-    "closures", "body", "Rows of what closes a loop, and the load of a hinge's laws.",
+    "closures",
+    "body",
+    "Rows of the element that closes a loop, and the load of the laws of a hinge.",
     (
         *_RELATIVE_MOTION,
-        *_gap("gaping"),
-        *_gap("placing"),
+        *_gap_calls("gaping"),
+        *_gap_calls("placing"),
         *_CONSTRAINT_STEPS,
-        _known("closure.gap", "gaping"),
-        _known("closure.slip", "slipping"),
+        _known_rows_call("closure.gap", "gaping"),
+        _known_rows_call("closure.slip", "slipping"),
         efforts_of_own("own.told", "refined"),
-        *only("!corrected !placing", _DRIFT, *_DIRECTION_RATES, _known("local.drift", "")),
-        *only("placing", _CLOSING, _known("local.relative", "")),
+        *only(
+            "!corrected !placing", _DRIFT, *_DIRECTION_RATES, _known_rows_call("local.drift", "")
+        ),
+        *only("placing", _REQUIRED_ACCELERATION, _known_rows_call("local.relative", "")),
         _EFFORTS,
         ForEach(
             of="rows",
@@ -121,27 +135,32 @@ CLOSURES = Pass(
                     "refined",
                     call("loops.loaded", K="closure.J_A[6 * c]", x="line.told", e="parent.e"),
                     call("loops.loaded", K="closure.J_B[6 * c]", x="line.told", e="outboard.e"),
-                    call("loops.yielded", when="soft", softness="line.softness", s="body.s[c]",
-                         x="line.told", l="line.known"),
+                    call(
+                        "loops.yielded",
+                        when="soft",
+                        softness="line.softness",
+                        s="body.s[c]",
+                        x="line.told",
+                        l="line.known",
+                    ),
                 ),
             ),
         ),
-        OF_OWN,
-        OF_OWN_BIAS,
+        OWN_COUPLINGS,
+        OWN_COUPLINGS_BIAS,
     ),
     skip="!cut",
-)  # fmt: skip
+)
 
 #: Multipliers are known from an earlier evaluation of accelerations in this workspace.
 CLOSURES_LOADED = Pass(
-    "closures_loaded", "body", "Rows of a hinge that closes a loop, and all the load that it puts"
-    " on its bodies.",
+    "closures_loaded", "body", "Rows of a cut hinge, and its complete load on its bodies.",
     (
         *_RELATIVE_MOTION,
         *_CONSTRAINT_STEPS,
         _DRIFT,
         *_DIRECTION_RATES,
-        _known("local.drift", ""),
+        _known_rows_call("local.drift", ""),
         efforts_of_own("own.x", ""),
         _EFFORTS,
         ForEach(
@@ -152,7 +171,7 @@ CLOSURES_LOADED = Pass(
                 call("loops.loaded", K="closure.J_B[6 * c]", x="line.x", e="outboard.e"),
             ),
         ),
-        OWN_TOLD,
+        OWN_EFFORTS_TO_KNOWN,
     ),
     skip="!cut",
 )  # fmt: skip
@@ -161,7 +180,7 @@ _ROW = {"inverse": "row.inverse", "l": "row.known"}
 _COLUMN = {"inverse": "row.inverse", "K": "row.K"}
 
 ROW_CLOSED = Pass(
-    "row_closed", "row", "A row closed on the body where its ends meet.",
+    "row_closed", "row", "A row eliminated on the body where its ends meet.",
     (
         Copy(to="row.inverse", when="unmoved"),
         call("loops.settle", when="!unmoved", inverse="row.inverse", L="row.pivot",
@@ -202,7 +221,7 @@ ROW_FOUND = Pass(
 )  # fmt: skip
 
 UNLOADED = Pass(
-    "unloaded", "body", "No load and no effort: the rows alone are to be met.",
+    "unloaded", "body", "Loads and efforts set to zero: only the rows are to be satisfied.",
     (Copy(to="body.e"), Copy(to="body.tau"), *only("modal", Copy(to="modes.e_f"))),
 )  # fmt: skip
 
@@ -222,11 +241,10 @@ _ROWS_CONDENSED = ForEach(
         ),
     ),
 )  # fmt: skip
-_MODES_ANSWERED = (
+_MODAL_SOLUTION = (
     call("modal.recover", Gg="modes.gain", delta_I="body.delta", etadd="modes.etadd"),
     ForEach(
-        of="bent",
-        steps=(call("modal.row_answered", Y="bent.y", x="bent.x", etadd="modes.etadd"),),
+        of="bent", steps=(call("modal.row_answered", Y="bent.y", x="bent.x", etadd="modes.etadd"),)
     ),
     Copy(to="modes.udot", source="modes.etadd"),
     Add(to="modes.udot", source="modes.given", when="refined"),
@@ -240,8 +258,7 @@ _ROW_COUPLING = only(
     call("generic{free}.divide", F="hinge.F", y="pending.y", z="local.z"),
     call("generic{free}.answered", y="hinge.g", z="local.z", l="pending.known"),
     ForEach(
-        of="before",
-        steps=(call("generic{free}.couple", y="before.y", z="local.z", L_ij="pair.L"),),
+        of="before", steps=(call("generic{free}.couple", y="before.y", z="local.z", L_ij="pair.L"),)
     ),
 )
 
@@ -282,7 +299,7 @@ _UNSTAGED_STEPS = only(
                 "coupled",
                 SelectColumns(to="local.tau", source="pending.tau"),
                 *_carry_load("", "pending.K", "local.tau", "pending.y", "pending.onward"),
-                replace(TOLD, when=""),
+                replace(EFFORTS_TO_KNOWN, when=""),
             ),
             *_ROW_COUPLING,
         ),
@@ -290,17 +307,17 @@ _UNSTAGED_STEPS = only(
 )  # fmt: skip
 _STAGED_STEPS = only(
     "staged",
-    *condensed("body.e"),
+    *eliminate_free_speeds("body.e"),
     _effort_remainder("local.e", "hinge.tau_free", "hinge.g"),
     *eliminate_with_effort("hinge.tau_free", "hinge.z"),
-    JUDGED,
+    PIVOT_CHECK,
     *ONWARD,
-    *HANDED_ON,
+    *ADD_TO_PARENT,
     ForEach(
         of="pending",
         steps=(
             _MODAL_COLUMN,
-            *condensed("pending.K"),
+            *eliminate_free_speeds("pending.K"),
             *only(
                 "!coupled",
                 _effort_remainder("local.e", "zero", "pending.y"),
@@ -311,8 +328,8 @@ _STAGED_STEPS = only(
                 SelectColumns(to="local.tau", source="pending.tau"),
                 _effort_remainder("local.e", "local.tau", "pending.y"),
                 *eliminate_with_effort("local.tau", "pending.z"),
-                replace(TOLD, when=""),
-                replace(TOLD_OF_BIAS, when="!corrected"),
+                replace(EFFORTS_TO_KNOWN, when=""),
+                replace(BIAS_EFFORTS_TO_KNOWN, when="!corrected"),
             ),
             *ONWARD,
             Add(to="pending.onward", source="local.e", when="hung"),
@@ -327,7 +344,7 @@ CARRIED = Pass(
     (
         *only("modal", RunPass(whole=MODAL_CONDENSE), _ROWS_CONDENSED),
         ForEach(of="closings", steps=(RunPass(whole=ROW_CLOSED),)),
-        *only("outward", ABSORBED),
+        *only("outward", PORT_ASSEMBLY),
         *FREE,
         efforts_of("pending.told", "refined"),
         FREE_EFFORTS,
@@ -368,8 +385,8 @@ ANSWERED = Pass(
         ),
         Add(to="body.udot", source="body.chosen", when="staged !corrected"),
         ForEach(of="openings", steps=(RunPass(whole=ROW_FOUND),)),
-        *only("modal", *_MODES_ANSWERED),
-        *only("section", *DISPLACED),
+        *only("modal", *_MODAL_SOLUTION),
+        *only("section", *PORT_MOTION),
         # The elimination has overwritten H.
         RunPass(whole=HINGE_MOTION, when="!staged imposed balance"),
     ),
@@ -377,7 +394,7 @@ ANSWERED = Pass(
 )  # fmt: skip
 
 CLOSURES_ANSWERED = Pass(
-    "closures_answered", "body", "Accelerations and load of a hinge that closes a loop.",
+    "closures_answered", "body", "Accelerations and load of a cut hinge.",
     (
         Copy(to="body.udot", source="body.s"),
         Add(to="body.udot", source="body.chosen", when="staged !corrected"),

@@ -8,12 +8,12 @@ to the root resist.
 from __future__ import annotations
 
 from .forward_kinematics import FORWARD, HINGE_MOTION, PRESCRIBED
-from .inverse_dynamics import FELT_ON_THE_WAY
+from .inverse_dynamics import EFFORT_AND_TRANSPORT
 from .pass_steps import TIPS_TO_ROOT, Copy, Pass, Run, RunPass, Sweep, call
 from .riccati_sweep import BODY
 
 COMPOSED = Pass(
-    "composed", "body", "Inertia of a body and of all that hangs on it, carried to the parent.",
+    "composed", "body", "Inertia of a body and its outboard part, carried to the parent.",
     (
         RunPass(whole=HINGE_MOTION, when="own"),
         Copy(to="body.tau"),
@@ -26,19 +26,19 @@ COMPOSED = Pass(
 EXERTED = Pass(
     "exerted",
     "body",
-    "Load of everything outboard under the hinge's given accelerations.",
+    "Load of the outboard part at the given accelerations of the hinge.",
     (call("generic{nu}.exerted", S="body.S", H="hinge.H", udot="body.given", e="body.e"),),
 )
 
 FELT_BY = Pass(
     "felt_by",
     "body",
-    "What one hinge feels of a load, and the load on the parent.",
-    FELT_ON_THE_WAY,
+    "Efforts of a load along the speeds of one hinge, and the load on the parent.",
+    EFFORT_AND_TRANSPORT,
 )
 
 COMPOSITION = Sweep(
     "composition",
-    "Inertia of everything outboard of each hinge, as if no hinge moved.",
+    "Inertia of the outboard part of each hinge, all hinges at rest.",
     (Run(whole=PRESCRIBED), Run(whole=FORWARD), Run(whole=COMPOSED)),
 )

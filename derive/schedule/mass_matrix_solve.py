@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from .flexible import ABSORBED, DISPLACED, FELT, MODAL_CONDENSE
+from .flexible import MODAL_CONDENSE, MODAL_EFFORT, PORT_ASSEMBLY, PORT_MOTION
 from .forward_kinematics import HINGE_MOTION
 from .pass_steps import TIPS_TO_ROOT, Add, Copy, Pass, RunPass, ScatterSpeeds, call, only
 from .riccati_sweep import BODY, FREE, FREE_EFFORTS
 
 FACTORISE = Pass(
-    "factorise", "body", "Mass matrices carried to the root; what each elimination leaves is kept.",
+    "factorise", "body", "Mass matrices carried to the root; factors of eliminations stored.",
     (
         RunPass(whole=HINGE_MOTION, when="own"),
         # Loads are carried but not read: each column starts from zero load.
         RunPass(whole=MODAL_CONDENSE, when="modal"),
-        *only("outward", ABSORBED),
+        *only("outward", PORT_ASSEMBLY),
         *FREE,
         call("generic{free}.factor", fails="undetermined", **BODY, H="hinge.H_free",
              J="hinge.J_free", W="zero", floor="body.floor", S="body.S", F="hinge.F",
@@ -23,7 +23,7 @@ FACTORISE = Pass(
 )  # fmt: skip
 
 COLUMN = Pass(
-    "column", "body", "One column as efforts, and no load yet.",
+    "column", "body", "Efforts of one right-hand side; loads set to zero.",
     (
         Copy(to="body.e"),
         Copy(to="body.tau", source="body.column"),
@@ -33,13 +33,13 @@ COLUMN = Pass(
 )  # fmt: skip
 
 COLUMN_CARRIED = Pass(
-    "column_carried", "body", "The column's load carried across the hinge to the parent.",
+    "column_carried", "body", "Load of the right-hand side carried across the hinge to the parent.",
     (
-        *only("modal section", *FELT),
+        *only("modal section", *MODAL_EFFORT),
         *only("modal", call("modal.pushed", Gg="modes.gain", e="body.e", e_f="modes.e_f",
                             e_c="local.e_c"),
               Copy(to="body.e", source="local.e_c")),
-        *only("outward", *FELT),
+        *only("outward", *MODAL_EFFORT),
         FREE_EFFORTS,
         call("generic{free}.push", **BODY, H="hinge.H_free", G="hinge.G", e="body.e",
              tau="hinge.tau_free", y="hinge.g", e_I="parent.e"),
@@ -48,7 +48,7 @@ COLUMN_CARRIED = Pass(
 )  # fmt: skip
 
 COLUMN_ANSWERED = Pass(
-    "column_answered", "body", "Accelerations that answer the column.",
+    "column_answered", "body", "Accelerations due to the right-hand side.",
     (
         call("generic{free}.answer", **BODY, H="hinge.H_free", F="hinge.F", G="hinge.G",
              y="hinge.g", delta_I="parent.delta", udot="hinge.rates", delta="body.delta"),
@@ -57,7 +57,7 @@ COLUMN_ANSWERED = Pass(
                             delta_I="body.delta", y="modes.felt", etadd="modes.etadd",
                             work="modes.work"),
               Copy(to="modes.answer", source="modes.etadd")),
-        *only("section", *DISPLACED),
+        *only("section", *PORT_MOTION),
     ),
     skip="idle",
 )  # fmt: skip

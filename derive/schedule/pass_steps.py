@@ -244,7 +244,7 @@ def only(when: str, *steps: Step) -> tuple[Step, ...]:
     return tuple(replace(step, when=f"{when} {step.when}".strip()) for step in steps)
 
 
-def inner(step: Step) -> Iterator[Step]:
+def all_steps(step: Step) -> Iterator[Step]:
     """The step and all steps inside it."""
     yield step
     parts: tuple[Step, ...] = ()
@@ -255,16 +255,16 @@ def inner(step: Step) -> Iterator[Step]:
     elif isinstance(step, RunPass) and step.whole is not None:
         parts = step.whole.steps
     for part in parts:
-        yield from inner(part)
+        yield from all_steps(part)
 
 
-def elsewhere(whole: Pass, name: str, slots: Mapping[str, str]) -> Pass:
+def with_renamed_slots(whole: Pass, name: str, slots: Mapping[str, str]) -> Pass:
     """Pass with the same steps on other slots; `name` is prefixed to its name."""
 
-    def renamed(step: Step) -> Step:
+    def rename_slots(step: Step) -> Step:
         if isinstance(step, RunPass):
             assert step.whole is not None
-            return replace(step, whole=elsewhere(step.whole, name, slots))
+            return replace(step, whole=with_renamed_slots(step.whole, name, slots))
         if isinstance(step, Call):
             ports = ((port, slots.get(slot, slot)) for port, slot in step.ports)
             return replace(step, ports=tuple(ports))
@@ -273,4 +273,4 @@ def elsewhere(whole: Pass, name: str, slots: Mapping[str, str]) -> Pass:
         }
         return replace(step, **fields)
 
-    return replace(whole, name=f"{name}_{whole.name}", steps=tuple(map(renamed, whole.steps)))
+    return replace(whole, name=f"{name}_{whole.name}", steps=tuple(map(rename_slots, whole.steps)))

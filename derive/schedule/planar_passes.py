@@ -77,7 +77,7 @@ _OMITTED_HOOKS = {"rows_asked"}
 _ZERO_SLOT = "body.s"
 
 
-def sweep_in_plane(whole: Sweep) -> Sweep:
+def planar_sweep(whole: Sweep) -> Sweep:
     """Sweep for planar scenes.
 
     Loops are closed as soon as both bodies of a cut hinge are known, before other loads act on

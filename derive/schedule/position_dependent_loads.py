@@ -50,7 +50,7 @@ def _along_position(entries: str, *steps: Step) -> tuple[Step, ...]:
 
 
 #: Drag by motion and modes is added to the body's own load.
-DRAGGED = RunPass(whole=differentiate_pass(DRAG), when="drag")
+DRAG_DERIVATIVE = RunPass(whole=differentiate_pass(DRAG), when="drag")
 #: Drag along the position of a flexible body; zero without drag.
 OWN_BY_PLACE = only(
     "modal placed",
@@ -58,7 +58,7 @@ OWN_BY_PLACE = only(
         "place",
         Copy(to=D + "body.e"),
         Copy(to=D + "modes.e_f"),
-        DRAGGED,
+        DRAG_DERIVATIVE,
         Move(to="place.S[6 * c]", source=D + "body.e", count="6"),
         Move(to="bend.place_Z[n * c]", source=D + "modes.e_f", count="n"),
     ),
@@ -72,7 +72,7 @@ _APPLIED_LOAD = next(
 _LOAD_INPUTS = LOADS.steps[: LOADS.steps.index(_APPLIED_LOAD)]
 
 LOADS_BY_PLACE = Pass(
-    "loads_by_place", "load", "Change of a load in the axes of space as its body turns.",
+    "loads_by_place", "load", "Change of a load in inertial axes by the rotation of its body.",
     (
         *_LOAD_INPUTS,
         *_along_position(
@@ -105,7 +105,7 @@ _FORCE_DERIVATIVES = tuple(map(_skip_ground_end, filter(_computes_derivative, _F
 _GROUND_END = tuple(Copy(to=f"{D}local.{name}_{end}") for end in "FT" for name in "Axvw")
 
 FORCES_BY_PLACE = Pass(
-    "forces_by_place", "force", "Change of an element to the ground as its body moves.",
+    "forces_by_place", "force", "Change of the load of an element on the ground by its motion.",
     (
         *(step for step in _FORCE_STEPS if not _computes_derivative(step)),
         *_GROUND_END,
@@ -138,7 +138,7 @@ HINGE_REDUCED = only(
     call("tangent.placed_reduce", n="free", inverse="tangent.inverse", **_ROWS, V="tangent.V",
          gain="place.gain", **_ROW_PORTS),
 )  # fmt: skip
-MODES_OWN = only(
+MODES_OWN_LOAD = only(
     "modal section placed",
     call("tangent.placed_own", n="modes", B_p="bend.place_B", **_ROW_PORTS, Z_p="bend.place_Z",
          K="bend.K", Z_x="bend.Z_x"),
@@ -157,36 +157,42 @@ MODES_REDUCED = (
     *only("modal placed", Copy(to="place.S", source="local.S_p")),
 )
 _POSE_PORTS = {"Rc": "body.R", "r": "body.r"}
-CARRIED = call("frames.placed_carry", when="placed", **_POSE_PORTS, **_ROW_PORTS, T_p="local.T_p",
-               T_w="local.T", S_pI="inboard.place", S_wI="inboard.S")  # fmt: skip
-ABSORBED = call("tangent.placed_absorb", n="modes", when="outward placed", **_POSE_PORTS,
+CARRY_TO_PARENT = call(
+    "frames.placed_carry", when="placed", **_POSE_PORTS, **_ROW_PORTS, T_p="local.T_p",
+    T_w="local.T", S_pI="inboard.place", S_wI="inboard.S",
+)  # fmt: skip
+PORT_ASSEMBLY = call("tangent.placed_absorb", n="modes", when="outward placed", **_POSE_PORTS,
                 H="section.H", B_p="port.place_B", **_ROW_PORTS, T_p="local.T_p", K="bend.K",
                 Z_p="bend.place_Z", Z_x="bend.Z_x")  # fmt: skip
 
 # --- one right-hand side ------------------------------------------------------------------------
 
-KNOWN = call("frames.placed_known", when="placed", **_ROW_PORTS, b_p="place.known",
+KNOWN_LOAD = call("frames.placed_known", when="placed", **_ROW_PORTS, b_p="place.known",
              e_S="local.seen", e_b="local.known")  # fmt: skip
-MOVED = call("frames.placed_moved", when="placed", **_POSE_PORTS, z_I=D + "parent.motion",
+POSITION_CHANGE = call("frames.placed_moved", when="placed", **_POSE_PORTS, z_I=D + "parent.motion",
              p_I="inboard.z", p="place.z")  # fmt: skip
-KNOWN_MOVED = Add(to="place.z", source="place.known")
+KNOWN_POSITION_CHANGE = Add(to="place.z", source="place.known")
 
 
-def _displaced(size: str, b: str, unknowns: str) -> tuple[Step, ...]:
+def _displacement_steps(size: str, b: str, unknowns: str) -> tuple[Step, ...]:
     return (
         call("tangent.displaced", n=size, B=b, x=unknowns, z_c="place.z", z="local.p"),
         Copy(to="place.z", source="local.p"),
     )
 
 
-HINGE_LEFT = only(
+HINGE_REMAINDER = only(
     "moving placed",
     call("tangent.placed_left", n="free", gain="place.gain", p="place.z", y="tangent.y"),
 )
-HINGE_DISPLACED = only("moving placed", *_displaced("free", "place.B", "local.x"))
-PORT_DISPLACED = only("outward placed", *_displaced("modes", "port.place_B", "modes.answer"))
-MODES_LEFT = only(
+HINGE_DISPLACED = only("moving placed", *_displacement_steps("free", "place.B", "local.x"))
+PORT_DISPLACED = only(
+    "outward placed", *_displacement_steps("modes", "port.place_B", "modes.answer")
+)
+MODES_REMAINDER = only(
     "modal placed",
     call("tangent.placed_left", n="modes", gain="bend.place_gain", p="place.z", y="bend.y"),
 )
-MODES_DISPLACED = only("modal section placed", *_displaced("modes", "bend.place_B", "modes.answer"))
+MODES_DISPLACED = only(
+    "modal section placed", *_displacement_steps("modes", "bend.place_B", "modes.answer")
+)

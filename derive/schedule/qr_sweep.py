@@ -12,7 +12,7 @@ from .pass_steps import TIPS_TO_ROOT, Copy, Pass, RunPass, call
 from .riccati_sweep import FREE, FREE_EFFORTS
 
 QR_OWN = Pass(
-    "qr_own", "body", "Rows of a body alone, and in them its load at the bias motion.",
+    "qr_own", "body", "Rows of a single body, with its load at the bias motion.",
     (
         RunPass(whole=HINGE_MOTION, when="own"),
         call("qr.factor", S="body.S", U="local.U"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .flexible import ABSORBED, DISPLACED, MODAL_CONDENSE
+from .flexible import MODAL_CONDENSE, PORT_ASSEMBLY, PORT_MOTION
 from .pass_steps import (
     TIPS_TO_ROOT,
     Add,
@@ -78,7 +78,7 @@ _ELIMINATION_PORTS = {
 }  # fmt: skip
 
 
-def condensed(load: str) -> tuple[Step, ...]:
+def eliminate_free_speeds(load: str) -> tuple[Step, ...]:
     """S and a load after elimination of the hinge's free speeds."""
     return (
         Copy(to="local.S", source="body.S"),
@@ -102,21 +102,21 @@ ONWARD = (
     transport("hinge", "hinge.d", when="hung !axial"),
     transport("connection", "connection.r", when="hung"),
 )
-JUDGED = CheckPivots(
+PIVOT_CHECK = CheckPivots(
     pivots="local.pivots", subspace="hinge.H_free", own="body.own", whole="body.S",
     fails="undetermined", when="free",
 )  # fmt: skip
-HANDED_ON = (
+ADD_TO_PARENT = (
     Add(to="parent.S", source="local.S", when="hung"),
     Add(to="parent.e", source="local.e", when="hung"),
 )
 _STAGED_STEPS = only(
     "staged",
-    *condensed("body.e"),
+    *eliminate_free_speeds("body.e"),
     *eliminate_with_effort("hinge.tau_free", "hinge.z"),
-    JUDGED,
+    PIVOT_CHECK,
     *ONWARD,
-    *HANDED_ON,
+    *ADD_TO_PARENT,
 )
 
 _GAINS = {"G": "hinge.G", "g": "hinge.g"}
@@ -127,7 +127,7 @@ CONDENSE = Pass(
     "condense", "body", "S and e of a body, complete, carried across its hinge to the parent.",
     (
         RunPass(whole=MODAL_CONDENSE, when="modal"),
-        *only("outward", ABSORBED),
+        *only("outward", PORT_ASSEMBLY),
         *only("parts", *FREE, FREE_EFFORTS),
         call("hinge.condense", when="own", fails="undetermined", **BODY, **COORDINATES,
              **_BODY_PORTS, tau="body.tau", **_GAINS, **_PARENT_PORTS),
@@ -173,7 +173,7 @@ RECOVER = Pass(
              etadd="modes.etadd"),
         Copy(to="modes.udot", source="modes.etadd", when="modal"),
         Add(to="modes.udot", source="modes.given", when="modal refined"),
-        *only("section", *DISPLACED),
+        *only("section", *PORT_MOTION),
     ),
     skip="idle", given=("parent.delta",),
 )  # fmt: skip

@@ -47,7 +47,7 @@ own | 21 | S of the body alone
 U | 21 | rows of everything outboard, S = U^T U: the upper triangle
 d | 6 | load part of the rows, f = U^T (U a + d) + e
 w | 3 | angular velocity, own axes: the first of `motion`
-p | np | numbers of the body's kernels
+p | np | parameters of the body's kernels
 q | nq | coordinates of the hinge
 u | nu | speeds of the hinge
 rotor | nu | inertia of rotors reflected to the speeds
@@ -66,7 +66,7 @@ H | 6 nu | motion subspace
 v | 3 | relative velocity, outboard axes
 w | 3 | relative angular velocity, outboard axes
 c | 6 | relative acceleration at udot = 0
-p | np | numbers of the hinge's kernels
+p | np | parameters of the hinge's kernels
 G | 6 nu | udot = g - G a
 g | nu | udot = g - G a
 rates | nu | accelerations of the free speeds
@@ -89,7 +89,7 @@ eta | n | modal coordinates
 etad | n | modal rates
 qdot | n | rates of the modal coordinates
 udot | n | modal accelerations
-etadd | n | modal accelerations, kept
+etadd | n | stored modal accelerations
 given | n | given modal accelerations of inverse dynamics
 efforts | n | efforts of the caller on the modes
 required | n | efforts required by the given modal accelerations
@@ -100,7 +100,7 @@ D | n n | damping
 S_rf | 6 n | frame rows, modal columns
 based | 6 n | S_rf relative to the supported section
 A | 6 n | acceleration of second order by modal rates
-A_drag | 6 n | the same under the density of the drag
+A_drag | 6 n | the same with the drag as density
 S_ff | n n | modal rows and columns
 e_f | n | force part of the modal rows
 right | 7 n | right-hand sides of the modal elimination
@@ -110,11 +110,11 @@ felt | n | efforts on the modes by a load
 """
 _SECTION = """
 Phi | 6 n | shapes at the section
-x | 3 | place of the section in the frame
+x | 3 | position of the section in the frame
 Psi | 3 | rotation vector of the section
-xd | 3 | its rate of place
+xd | 3 | its velocity
 Psid | 3 | its rate of rotation
-xdd | 3 | bias of place
+xdd | 3 | bias of the position
 Psidd | 3 | bias of rotation
 H6 | 36 | motion of the end by motion of the section
 H | 6 n | motion subspace of the modes

@@ -25,7 +25,7 @@ from .loop_closure import (
 from .mass_matrix import COMPOSITION, EXERTED, FELT_BY
 from .mass_matrix_solve import COLUMN, COLUMN_ANSWERED, COLUMN_CARRIED, FACTORISE
 from .pass_steps import Pass, Run, Sweep
-from .planar_passes import sweep_in_plane
+from .planar_passes import planar_sweep
 from .qr_sweep import QR_CONDENSE, QR_OWN
 from .riccati_sweep import CONDENSE, RECOVER
 from .tangent_sweep import (
@@ -96,10 +96,10 @@ ACCELERATIONS = Sweep(
 )  # fmt: skip
 
 #: For planar scenes with closed loops, without observation.
-ACCELERATIONS_IN_PLANE = sweep_in_plane(ACCELERATIONS)
+ACCELERATIONS_IN_PLANE = planar_sweep(ACCELERATIONS)
 
 INVERSE_DYNAMICS = Sweep(
-    "inverse_dynamics", "Efforts that given accelerations need beyond the laws' own.",
+    "inverse_dynamics", "Efforts required by given accelerations in addition to those of the laws.",
     (
         *_GIVEN_RUNS,
         Run(whole=FORWARD),
@@ -117,8 +117,8 @@ INVERSE_DYNAMICS = Sweep(
 
 CORRECTION = Sweep(
     "correction",
-    "The least change, by inertia, that closes gaps or stops slips of closed loops, and what a"
-    " strike adds to it.",
+    "Smallest change, weighted by inertia, that removes position gaps or velocity errors of closed"
+    " loops, and the contribution of an impact.",
     (
         Run(whole=PRESCRIBED),
         Run(hook="drive_values", when="driven"),
@@ -137,7 +137,7 @@ MOTION = Sweep(
     "motion", "Poses and velocities of all bodies.",
     (*_GIVEN_RUNS, Run(whole=FORWARD), Run(whole=POSES)),
 )  # fmt: skip
-POSED = Sweep("posed", "Poses alone, behind a sweep.", (Run(whole=POSES),))
+POSED = Sweep("posed", "Poses only, after a sweep.", (Run(whole=POSES),))
 
 FACTORISATION = Sweep(
     "factorisation",
@@ -146,7 +146,7 @@ FACTORISATION = Sweep(
 )
 SOLUTION = Sweep(
     "solution",
-    "One column: accelerations that given efforts alone produce.",
+    "One right-hand side: accelerations due to given efforts only.",
     (Run(whole=COLUMN), Run(whole=COLUMN_CARRIED), Run(whole=COLUMN_ANSWERED)),
 )
 

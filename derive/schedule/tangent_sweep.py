@@ -49,8 +49,8 @@ from .pass_steps import (
     Step,
     Sweep,
     call,
-    elsewhere,
     only,
+    with_renamed_slots,
 )
 
 #: Relative motion across any hinge, and of the outboard body.  Inverse dynamics has stored the
@@ -63,7 +63,7 @@ _HINGE_MOTION = Pass(
 HINGE_CHANGE = differentiate_pass(_HINGE_MOTION)
 #: The same where later steps do not read it.
 _LOCAL_CHANGE_SLOTS = {f"hinge.{name}": f"local.hinge_{name}" for name in HINGE}
-_LOCAL_CHANGE_STEPS = elsewhere(HINGE_CHANGE, "", _LOCAL_CHANGE_SLOTS).steps
+_LOCAL_CHANGE_STEPS = with_renamed_slots(HINGE_CHANGE, "", _LOCAL_CHANGE_SLOTS).steps
 _FORWARD_CALL = call("generic{nu}.forward", **CONNECTION, **HINGE, s="body.s",
                      motion_I="parent.motion", **BODY)  # fmt: skip
 _FORWARD = Pass(
@@ -104,7 +104,7 @@ _COUPLING_RUNS = (
 )
 _CLOSURE_RUN = Run(whole=differentiate_pass(_skip_hinge_motion(CLOSURES_LOADED)), when="looped")
 DIRECTIONAL = Sweep(
-    "required_slope", "Derivative of the efforts that given accelerations need.",
+    "required_slope", "Derivative of the efforts required by given accelerations.",
     (
         *_MOTION_RUNS,
         Run(whole=differentiate_pass(EFFORTS)),
@@ -117,7 +117,7 @@ DIRECTIONAL = Sweep(
     ),
 )  # fmt: skip
 
-_NO_LOADS = Pass("no_loads", "body", "Loads begun from none.", (Copy(to=D + "body.e"),))
+_NO_LOADS = Pass("no_loads", "body", "Loads set to zero.", (Copy(to=D + "body.e"),))
 
 
 def _across_tree(whole: Pass, own: str) -> Run:
@@ -133,7 +133,7 @@ def _across_tree(whole: Pass, own: str) -> Run:
 #: include them.
 APPLIED_SLOPE = Sweep(
     "applied_slope",
-    "Derivative of what acts across the tree, and of the values of expressions.",
+    "Derivative of loads between branches of the tree, and of the values of expressions.",
     (
         *_MOTION_RUNS,
         _POSE_RUN,
@@ -266,7 +266,7 @@ _HINGE = (
 )  # fmt: skip
 
 LAG = Pass(
-    "lag", "body", "How the coordinates of a hinge follow its speeds within a step.",
+    "lag", "body", "Derivatives of the coordinates of a hinge by its speeds within a step.",
     (
         call("hinge.rates_by_coordinates", **COORDINATES, J="tangent.turns"),
         call("hinge.rates_by_speeds", **COORDINATES, J="tangent.ways"),
@@ -311,7 +311,7 @@ LAW_CHANGE = tuple(
 LAW_SLOPES = Pass(
     "law_slopes",
     "law",
-    "Slopes of a law along the unknowns of its hinge.",
+    "Derivatives of a law along the unknowns of its hinge.",
     (
         ForEachDirection(
             of="felt", steps=(*LAW_CHANGE, Add(to="law.slopes", source=D + "local.tau"))
@@ -320,7 +320,7 @@ LAW_SLOPES = Pass(
 )
 
 TANGENT_OWN = Pass(
-    "tangent_own", "body", "A body's own load by its motion and its modes.",
+    "tangent_own", "body", "Derivatives of a body's own load by its motion and its modes.",
     (
         Copy(to="tangent.laws", when="laws"),
         RunPass(whole=LAG, when="curved"),
@@ -333,7 +333,7 @@ TANGENT_OWN = Pass(
                 of="motion",
                 steps=(
                     RunPass(whole=differentiate_pass(MODAL_OWN)),
-                    position_dependent_loads.DRAGGED,
+                    position_dependent_loads.DRAG_DERIVATIVE,
                     Move(to="tangent.S[6 * c]", source=D + "body.e", count="6"),
                     Move(to="bend.Z_z[n * c]", source=D + "modes.e_f", count="n"),
                 ),
@@ -342,7 +342,7 @@ TANGENT_OWN = Pass(
                 of="modes",
                 steps=(
                     RunPass(whole=differentiate_pass(MODAL_OWN)),
-                    position_dependent_loads.DRAGGED,
+                    position_dependent_loads.DRAG_DERIVATIVE,
                     Move(to="bend.K[6 * c]", source=D + "body.e", count="6"),
                     Move(to="bend.Z_x[n * c]", source=D + "modes.e_f", count="n"),
                 ),
@@ -371,7 +371,7 @@ _COLUMNS = (
     *only("outward", *_section_steps("port")),
 )
 _ELIMINATION_STEPS = (
-    *position_dependent_loads.MODES_OWN,
+    *position_dependent_loads.MODES_OWN_LOAD,
     call("tangent.node", n="modes", when="modal section", fails="tangent", H="section.H",
          **_NODE),
     call("tangent.node", n="modes", when="modal !section", fails="tangent", H="bend.still",
@@ -390,10 +390,10 @@ _ELIMINATION_STEPS = (
     ),
     *position_dependent_loads.HINGE_REDUCED,
     call("frames.tangent_carry", **_CARRY_PORTS, S="tangent.S", T="local.T", S_I="inboard.S"),
-    position_dependent_loads.CARRIED,
+    position_dependent_loads.CARRY_TO_PARENT,
     call("tangent.absorb", n="modes", when="outward", Rc="body.R", r="body.r", H="section.H",
          B="port.B", G="port.G", W="port.W", S="tangent.S", T="local.T", K_x="port.K", **_OWN),
-    position_dependent_loads.ABSORBED,
+    position_dependent_loads.PORT_ASSEMBLY,
 )  # fmt: skip
 
 TANGENT_CONDENSE = Pass(
@@ -404,11 +404,11 @@ TANGENT_CONDENSE = Pass(
 
 #: The same in two passes, for many tangents at one state: contributions are computed once.
 TANGENT_BROUGHT = Pass(
-    "tangent_brought", "body", "What a body brings to the elimination.", _COLUMNS, skip="aside"
+    "tangent_brought", "body", "Contribution of a body to the elimination.", _COLUMNS, skip="aside"
 )
 TANGENT_ELIMINATED = replace(
     TANGENT_CONDENSE, name="tangent_eliminated",
-    purpose="Unknowns of a body eliminated, of what it brings.", steps=_ELIMINATION_STEPS,
+    purpose="Unknowns of a body eliminated from its contribution.", steps=_ELIMINATION_STEPS,
 )  # fmt: skip
 
 _CONTRIBUTION_RUNS = (
@@ -419,12 +419,12 @@ _CONTRIBUTION_RUNS = (
 )
 TANGENT = Sweep(
     "tangent",
-    "Tangent of inverse dynamics factored, behind inverse dynamics itself.",
+    "Tangent of inverse dynamics factored, after inverse dynamics itself.",
     (*_CONTRIBUTION_RUNS, Run(whole=TANGENT_CONDENSE)),
 )
 BROUGHT = Sweep(
     "tangent_brought",
-    "What the tangent is eliminated from, behind inverse dynamics.",
+    "Contributions to the tangent before elimination, after inverse dynamics.",
     (*_CONTRIBUTION_RUNS, Run(whole=TANGENT_BROUGHT)),
 )
 
@@ -451,7 +451,7 @@ TANGENT_COLUMN = Pass(
 )  # fmt: skip
 
 
-def _modal_push_steps(subspace: str) -> tuple[Step, ...]:
+def _modal_load_steps(subspace: str) -> tuple[Step, ...]:
     return (
         call("tangent.push", n="modes", H=subspace, V="bend.V", D="bend.D", e=D + "body.e",
              e_f=D + "modes.e_f", rest="bend.rest", y="bend.y", e_c="local.e_c",
@@ -460,7 +460,7 @@ def _modal_push_steps(subspace: str) -> tuple[Step, ...]:
     )  # fmt: skip
 
 
-_PUSH_PORTS = {
+_LOAD_PORTS = {
     "Rc": "body.R", "r": "body.r", "H": "tangent.H", "V": "tangent.V",
     "inverse": "tangent.inverse", "e": D + "body.e", "e_f": "local.rows", "y": "tangent.y",
     "e_I": D + "parent.e",
@@ -471,13 +471,13 @@ _LOAD_TRANSPORT = call("frames.transport", when="!moving", Rc="body.R", r="body.
 TANGENT_CARRIED = Pass(
     "tangent_carried", "body", "Loads of a right-hand side carried to the parent.",
     (
-        *only("modal section", *_modal_push_steps("section.H")),
-        *only("modal !section", *_modal_push_steps("bend.still")),
+        *only("modal section", *_modal_load_steps("section.H")),
+        *only("modal !section", *_modal_load_steps("bend.still")),
         *only("outward", *_MODAL_EFFORT_CHANGE),
         *only(
             "moving",
             SelectColumns(to="local.rows", source=D + "body.tau"),
-            call("generic{free}.tangent_push", **_PUSH_PORTS),
+            call("generic{free}.tangent_push", **_LOAD_PORTS),
         ),
         _LOAD_TRANSPORT,
     ),
@@ -485,26 +485,26 @@ TANGENT_CARRIED = Pass(
 )  # fmt: skip
 
 _STORE_MOTION = Copy(to=D + "body.motion", source="local.z")
-_MOVED_PORTS = _CARRY_PORTS | {"z_I": D + "parent.motion", "z": D + "body.motion"}
-_ANSWER_PORTS = _MOVED_PORTS | {
+_OUTBOARD_MOTION_PORTS = _CARRY_PORTS | {"z_I": D + "parent.motion", "z": D + "body.motion"}
+_SOLUTION_PORTS = _OUTBOARD_MOTION_PORTS | {
     "B": "tangent.B",
     "gain": "tangent.gain",
     "y": "tangent.y",
     "x": "local.x",
 }
-_STORE_ANSWER = ScatterSpeeds(to="body.answer", free="local.x")
+_STORE_SOLUTION = ScatterSpeeds(to="body.answer", free="local.x")
 
 
 def _motion_with_modes(*known_steps: Step) -> tuple[Step, ...]:
     """Motion outboard of a body's own modes, or of those of the body that it is an end of."""
     return (
-        call("frames.tangent_moved", when="!moving", **_MOVED_PORTS),
+        call("frames.tangent_moved", when="!moving", **_OUTBOARD_MOTION_PORTS),
         *known_steps,
         call("tangent.displaced", n="modes", when="outward", B="port.B", x="modes.answer",
              z_c=D + "body.motion", z="local.z"),
         *only("outward", _STORE_MOTION),
         *position_dependent_loads.PORT_DISPLACED,
-        *position_dependent_loads.MODES_LEFT,
+        *position_dependent_loads.MODES_REMAINDER,
         *only(
             "modal",
             call("tangent.answer", n="modes", B="bend.B", gain="bend.gain", y="bend.y",
@@ -516,12 +516,12 @@ def _motion_with_modes(*known_steps: Step) -> tuple[Step, ...]:
 
 
 TANGENT_ANSWERED = Pass(
-    "tangent_answered", "body", "Unknowns that answer a right-hand side.",
+    "tangent_answered", "body", "Solution for a right-hand side.",
     (
         Copy(to="body.answer"),
-        position_dependent_loads.MOVED,
-        *position_dependent_loads.HINGE_LEFT,
-        *only("moving", call("generic{free}.tangent_answer", **_ANSWER_PORTS), _STORE_ANSWER),
+        position_dependent_loads.POSITION_CHANGE,
+        *position_dependent_loads.HINGE_REMAINDER,
+        *only("moving", call("generic{free}.tangent_answer", **_SOLUTION_PORTS), _STORE_SOLUTION),
         *position_dependent_loads.HINGE_DISPLACED,
         *_motion_with_modes(),
     ),
@@ -530,7 +530,7 @@ TANGENT_ANSWERED = Pass(
 
 TANGENT_SOLUTION = Sweep(
     "tangent_solution",
-    "One right-hand side through the factored tangent.",
+    "One right-hand side solved with the factored tangent.",
     (
         Run(whole=TANGENT_COLUMN),
         Run(hook="unit_load", when="united"),
@@ -545,7 +545,7 @@ TANGENT_SOLUTION = Sweep(
 KNOWN_COLUMN = Pass(
     "known_column",
     "body",
-    "A right-hand side, and own loads by what is known of modes.",
+    "A right-hand side, with own loads due to known modal increments.",
     (
         _NO_LOAD,
         Copy(to=D + "body.tau", source="body.column"),
@@ -554,14 +554,14 @@ KNOWN_COLUMN = Pass(
             Copy(to=D + "body.motion"),
             Copy(to=D + "body.v"),
             RunPass(whole=differentiate_pass(MODAL_OWN)),
-            position_dependent_loads.DRAGGED,
+            position_dependent_loads.DRAG_DERIVATIVE,
             _RIGHT,
         ),
     ),
 )
 
 KNOWN_LAWS = Pass(
-    "known_laws", "law", "Change of a law's efforts by what is known of its hinge.",
+    "known_laws", "law", "Change of the efforts of a law due to known increments of its hinge.",
     (*LAW_CHANGE, Add(to=D + "law.tau", source=D + "local.tau")),
 )  # fmt: skip
 
@@ -576,12 +576,12 @@ _KNOWN_LOAD = Add(to=D + "body.e", source="local.known")
 #: Rows of a hinge: carried load by the known increments, less the right-hand side and the change of
 #: laws, which KNOWN_COLUMN and KNOWN_LAWS add.
 KNOWN_CARRIED = Pass(
-    "known_carried", "body", "The same loads carried to the parent, with what is known.",
+    "known_carried", "body", "The same loads carried to the parent, with known increments.",
     (
         *only("section", _CARRIER, *_KNOWN_ROWS),
-        *only("modal section", *_modal_push_steps("section.H")),
-        *only("modal !section", *_modal_push_steps("bend.still")),
-        *only("section", _KNOWN, position_dependent_loads.KNOWN),
+        *only("modal section", *_modal_load_steps("section.H")),
+        *only("modal !section", *_modal_load_steps("bend.still")),
+        *only("section", _KNOWN, position_dependent_loads.KNOWN_LOAD),
         *only("outward", Add(to=D + "body.e", source="local.seen"), *_MODAL_EFFORT_CHANGE,
               Add(to=D + "body.e", source="local.turned")),
         *only("modal section", _KNOWN_LOAD),
@@ -591,8 +591,8 @@ KNOWN_CARRIED = Pass(
             *_hinge_steps("tangent.known", "local.turned", "place.known", D + "body.tau"),
             SelectColumns(to="local.rows", source="local.change"),
             _KNOWN,
-            position_dependent_loads.KNOWN,
-            call("generic{free}.tangent_push_known", **_PUSH_PORTS, e_b="local.known"),
+            position_dependent_loads.KNOWN_LOAD,
+            call("generic{free}.tangent_push_known", **_LOAD_PORTS, e_b="local.known"),
         ),
         _LOAD_TRANSPORT,
     ),
@@ -600,19 +600,19 @@ KNOWN_CARRIED = Pass(
 )  # fmt: skip
 
 KNOWN_ANSWERED = Pass(
-    "known_answered", "body", "Unknowns that answer a right-hand side, beside what is known.",
+    "known_answered", "body", "Solution for a right-hand side with known increments.",
     (
         Copy(to="body.answer"),
-        position_dependent_loads.MOVED,
-        *only("moving placed", position_dependent_loads.KNOWN_MOVED),
-        *position_dependent_loads.HINGE_LEFT,
+        position_dependent_loads.POSITION_CHANGE,
+        *only("moving placed", position_dependent_loads.KNOWN_POSITION_CHANGE),
+        *position_dependent_loads.HINGE_REMAINDER,
         *only("moving",
-              call("generic{free}.tangent_answer_known", **_ANSWER_PORTS, b="tangent.known"),
-              _STORE_ANSWER),
+              call("generic{free}.tangent_answer_known", **_SOLUTION_PORTS, b="tangent.known"),
+              _STORE_SOLUTION),
         *position_dependent_loads.HINGE_DISPLACED,
         *_motion_with_modes(
             Add(to=D + "body.motion", source="tangent.known", when="section"),
-            *only("section placed", position_dependent_loads.KNOWN_MOVED),
+            *only("section placed", position_dependent_loads.KNOWN_POSITION_CHANGE),
         ),
     ),
     skip="aside",
@@ -620,7 +620,7 @@ KNOWN_ANSWERED = Pass(
 
 TANGENT_BEYOND = Sweep(
     "tangent_beyond",
-    "One right-hand side through the factored tangent, parts of the increments being known.",
+    "One right-hand side solved with the factored tangent and known increments.",
     (
         Run(whole=KNOWN_COLUMN),
         Run(whole=KNOWN_LAWS),

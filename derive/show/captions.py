@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from .formula_layout import Name, Node, Raised, Row, Sign, Word
+from .formula_layout import Name, Node, Row, Sign, Superscript, Word
 from .plain_text import text_box
 from .symbol_names import is_letter, parse_name
 
@@ -83,7 +83,7 @@ def _classify_token(match: re.Match[str]) -> Token:
 
 
 def _with_exponent(base: Node, exponent: str) -> Node:
-    return Raised(base, Word(exponent.replace("-", "−"))) if exponent else base
+    return Superscript(base, Word(exponent.replace("-", "−"))) if exponent else base
 
 
 def _resolve_tokens(tokens: list[Token]) -> Iterator[Token]:

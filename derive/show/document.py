@@ -174,7 +174,9 @@ def _quantity_table(quantities: Iterable[Quantity], written: FormulaWriter) -> Q
         meaning = names.meaning(q.meaning) + symmetric
         shape = q.shape if q.shape[1] != 1 else q.shape[:1]
         rows.append(_quantity_row(q.name, shape, q.unit, meaning))
-        rows += [] if q.sized else _entry_rows(q.name, written.named.parts(q.name, q.rows))
+        rows += (
+            [] if q.has_runtime_size else _entry_rows(q.name, written.named.parts(q.name, q.rows))
+        )
     return Quantities(tuple(rows))
 
 

@@ -45,7 +45,7 @@ class NamedPart:
             return [AuthorName(self.name)]
         return list(sp.MatrixSymbol(self.name, *self.shape).as_explicit())
 
-    def written(self) -> list[str]:
+    def code_names(self) -> list[str]:
         """Name of each entry in code, indices from zero."""
         rows, columns = self.shape
         if self.length == 1:
@@ -97,15 +97,15 @@ _WITH_COORDINATES, _WITH_SPEEDS = ("qdot",), ("s", "udot", "tau", "g", "z")
 class DeclaredNames:
     """Names declared by an element, by array."""
 
-    own: Mapping[str, Parts] = field(default_factory=dict)
+    parts_by_array: Mapping[str, Parts] = field(default_factory=dict)
     #: Labels of entries of arrays that correspond to coordinates or speeds.
-    along: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    coordinate_labels: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     #: Lists of entries in descriptions of arrays; omitted where a table shows the entries.
-    listed: tuple[str, ...] = ()
+    listed_arrays: tuple[str, ...] = ()
 
     def parts(self, array: str, length: int) -> Parts:
         """Names of the entries of an array of this length; empty if none are declared."""
-        array_parts = self.own.get(array, ())
+        array_parts = self.parts_by_array.get(array, ())
         for parts in (
             array_parts,
             array_parts + _FRAME_PARTS if array == "p" else (),
@@ -118,17 +118,17 @@ class DeclaredNames:
     def written(self, array: str, length: int) -> tuple[str, ...]:
         """Entries of an array as in code (p.stiffness, w[0]); empty if none are declared."""
         base, slope = array.removeprefix("d_"), "d_" if array.startswith("d_") else ""
-        prefix = f"{slope}{base}." if base in self.own else slope
-        return tuple(prefix + x for part in self.parts(base, length) for x in part.written())
+        prefix = f"{slope}{base}." if base in self.parts_by_array else slope
+        return tuple(prefix + x for part in self.parts(base, length) for x in part.code_names())
 
     def labels(self, array: str, length: int) -> tuple[str, ...]:
         """Indices of the entries on a left side with several entries."""
-        array_labels = self.along.get(array, ())
+        array_labels = self.coordinate_labels.get(array, ())
         return array_labels if len(array_labels) == length > 1 else ()
 
     def meaning(self, text: str) -> str:
         """Description of an array without the list of its entries."""
-        for entry_list in self.listed:
+        for entry_list in self.listed_arrays:
             text = text.replace(entry_list, "", 1)
         return text
 
@@ -139,7 +139,7 @@ def declared_names(
     """Names of the arrays p, q and u and of the arrays that correspond to them."""
     groups = {"p": tuple(parameters), "q": tuple(coordinates), "u": tuple(speeds)}
     parts_by_array = {
-        array: tuple(NamedPart(x.name, x.unit, x.meaning) for x in group)
+        array: tuple(NamedPart(x.name, x.unit, x.description) for x in group)
         for array, group in groups.items()
     }
     q, u = (tuple(x.name for x in groups[array]) for array in "qu")
@@ -165,13 +165,17 @@ class NamedEntries:
         defined_symbols = [e.left for e in equations if isinstance(e.left, sp.MatrixSymbol)]
         input_symbols = [q.symbol for q in derivation.inputs]
         output_symbols = [q.symbol for q in derivation.outputs]
-        self._taken = {str(s.name) for s in (*input_symbols, *output_symbols, *defined_symbols)}
+        self._used_names = {
+            str(s.name) for s in (*input_symbols, *output_symbols, *defined_symbols)
+        }
         arrays = {
             str(s.name): s
             for s in (*input_symbols, *defined_symbols, *output_symbols)
             if _has_fixed_length(s)
         }
-        self._parts = {name: self._apart(name, int(s.rows)) for name, s in arrays.items()}
+        self._parts = {
+            name: self._unambiguous_parts(name, int(s.rows)) for name, s in arrays.items()
+        }
         #: Entry of an array -> declared name.
         self.entries = _symmetric_entries(derivation)
         for name, symbol in arrays.items():
@@ -183,12 +187,12 @@ class NamedEntries:
         """Entries of an array of this length."""
         return self._parts[array] if array in self._parts else self.names.parts(array, length)
 
-    def _apart(self, array: str, length: int) -> Parts:
+    def _unambiguous_parts(self, array: str, length: int) -> Parts:
         """Parts with the array as a prefix (p_name) where the name is taken."""
         parts = []
         for part in self.names.parts(array, length):
-            name = part.name if part.name not in self._taken else f"{array}_{part.name}"
-            self._taken.add(name)
+            name = part.name if part.name not in self._used_names else f"{array}_{part.name}"
+            self._used_names.add(name)
             parts.append(replace(part, name=name))
         return tuple(parts)
 
@@ -203,7 +207,7 @@ def _symmetric_entries(derivation: Derivation) -> dict[sp.Basic, sp.Basic]:
     """Replacements of symmetric matrices and their entries by `Symmetric` ones."""
     replacements: dict[sp.Basic, sp.Basic] = {}
     for q in derivation.inputs:
-        if q.symmetric and not q.sized:
+        if q.symmetric and not q.has_runtime_size:
             symmetric_symbol = Symmetric(q.name, q.rows, q.columns)
             replacements[q.symbol] = symmetric_symbol
             indices = [(i, j) for i in range(q.rows) for j in range(q.columns)]

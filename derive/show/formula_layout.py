@@ -42,10 +42,10 @@ class Word:
 
 @dataclass(frozen=True)
 class Sign:
-    """An operator; `spaced` adds space around it."""
+    """An operator; `has_spaces` adds space around it."""
 
     text: str
-    spaced: bool = False
+    has_spaces: bool = False
 
 
 @dataclass(frozen=True)
@@ -59,12 +59,12 @@ class Row:
 class Fraction:
     """Fraction above / below."""
 
-    above: Node
-    below: Node
+    numerator: Node
+    denominator: Node
 
 
 @dataclass(frozen=True)
-class Raised:
+class Superscript:
     """Base with a superscript."""
 
     base: Node
@@ -95,7 +95,7 @@ class Table:
     cases: bool = False
 
 
-Node = Name | Word | Sign | Row | Fraction | Raised | Fence | Root | Table
+Node = Name | Word | Sign | Row | Fraction | Superscript | Fence | Root | Table
 
 #: Arrays of coordinates, speeds, parameters, efforts and modal quantities: entries are numbered.
 COORDINATE_ARRAYS = frozenset(
@@ -153,7 +153,7 @@ class _Layout:
     def node(self, e: sp.Basic) -> Node:
         return self._print(e)[0]
 
-    def fenced(self, e: sp.Basic, level: int) -> Node:
+    def with_brackets(self, e: sp.Basic, level: int) -> Node:
         node, level_of_node = self._print(e)
         return node if level_of_node >= level else Fence("(", node, ")")
 
@@ -180,25 +180,25 @@ class _Layout:
                 items.append(Sign("−" if negative else "+", True))
             elif negative:
                 items.append(Sign("−"))
-            items.append(self.fenced(-term if negative else term, _PRODUCT))
+            items.append(self.with_brackets(-term if negative else term, _PRODUCT))
         return Row(tuple(items)), _SUM
 
     def product(self, e: sp.Mul) -> tuple[Node, int]:
         if _is_negative(e):
-            return Row((Sign("−"), self.fenced(-e, _PRODUCT))), _SUM
+            return Row((Sign("−"), self.with_brackets(-e, _PRODUCT))), _SUM
         above, below = sp.fraction(e)
         if below != 1:
             return Fraction(self.node(above), self.node(below)), _PRODUCT
-        factors = [self.fenced(f, _POWER) for f in above.as_ordered_factors()]
+        factors = [self.with_brackets(f, _POWER) for f in above.as_ordered_factors()]
         return Row(_space_factors(factors)), _PRODUCT
 
     def matrix_product(self, e: sp.MatMul) -> tuple[Node, int]:
         factor, matrices = e.as_coeff_matrices()
         if factor.could_extract_minus_sign():
-            return Row((Sign("−"), self.fenced(-e, _PRODUCT))), _SUM
-        factors = [self.fenced(m, _POWER) for m in matrices]
+            return Row((Sign("−"), self.with_brackets(-e, _PRODUCT))), _SUM
+        factors = [self.with_brackets(m, _POWER) for m in matrices]
         if factor != 1:
-            factors = [self.fenced(factor, _PRODUCT), *factors]
+            factors = [self.with_brackets(factor, _PRODUCT), *factors]
         return Row(_space_factors(factors)), _PRODUCT
 
     def power(self, e: sp.Pow) -> tuple[Node, int]:
@@ -206,7 +206,7 @@ class _Layout:
             return Root(self.node(e.base)), _ATOM
         if e.exp.is_number and e.exp.is_negative:
             return Fraction(Word("1"), self.node(e.base**-e.exp)), _PRODUCT
-        return Raised(self.fenced(e.base, _ATOM), self.node(e.exp)), _POWER
+        return Superscript(self.with_brackets(e.base, _ATOM), self.node(e.exp)), _POWER
 
     # --- matrices ---------------------------------------------------------------------------
 
@@ -225,22 +225,24 @@ class _Layout:
         return Table(tuple(tuple(row) for row in rows)), _ATOM
 
     def transpose(self, e: sp.Transpose) -> tuple[Node, int]:
-        return Raised(self.fenced(e.arg, _ATOM), Word("T")), _POWER
+        return Superscript(self.with_brackets(e.arg, _ATOM), Word("T")), _POWER
 
     def matrix_power(self, e: sp.MatPow) -> tuple[Node, int]:
-        return Raised(self.fenced(e.base, _ATOM), self.node(e.exp)), _POWER
+        return Superscript(self.with_brackets(e.base, _ATOM), self.node(e.exp)), _POWER
 
     def solve(self, e: Solve) -> tuple[Node, int]:
-        inverse = Raised(self.fenced(e.matrix, _ATOM), Word("−1"))
-        return Row(_space_factors([inverse, self.fenced(e.right, _POWER)])), _PRODUCT
+        inverse = Superscript(self.with_brackets(e.matrix, _ATOM), Word("−1"))
+        return Row(_space_factors([inverse, self.with_brackets(e.right, _POWER)])), _PRODUCT
 
     def factor(self, e: Factor) -> tuple[Node, int]:
-        return Row((Raised(Word("LDL"), Word("T")), Fence("(", self.node(e.matrix), ")"))), _ATOM
+        return Row(
+            (Superscript(Word("LDL"), Word("T")), Fence("(", self.node(e.matrix), ")"))
+        ), _ATOM
 
     def triangular(self, e: Triangular) -> tuple[Node, int]:
         lower = Row((Word("L"), Fence("(", self.node(e.factor), ")")))
-        inverse = Raised(lower, Word("−T" if e.transposed else "−1"))
-        return Row(_space_factors([inverse, self.fenced(e.right, _POWER)])), _PRODUCT
+        inverse = Superscript(lower, Word("−T" if e.is_transposed else "−1"))
+        return Row(_space_factors([inverse, self.with_brackets(e.right, _POWER)])), _PRODUCT
 
     def triangle(self, e: Triangle) -> tuple[Node, int]:
         return Row((Word("R"), Fence("(", self.node(e.matrix), ")"))), _ATOM
@@ -251,7 +253,7 @@ class _Layout:
         if isinstance(inner, Name) and not inner.accent and not inner.name.upright:
             return Name(inner.name, accent, inner.index), _ATOM
         mark = Word("∼" if accent == "tilde" else "⊥")
-        return Raised(Fence("(", inner, ")"), mark), _POWER
+        return Superscript(Fence("(", inner, ")"), mark), _POWER
 
     def element(self, e: MatrixElement) -> tuple[Node, int]:
         parent = e.parent
@@ -262,7 +264,7 @@ class _Layout:
 
     def part(self, e: SymbolPart) -> tuple[Node, int]:
         spans = []
-        for start, count, extent in zip(e.first, e.shape, e.symbol.shape, strict=True):
+        for start, count, extent in zip(e.first_index, e.shape, e.symbol.shape, strict=True):
             if extent != 1:
                 stop = start + int(count)
                 spans.append(f"{start + 1}…{stop}" if count != 1 else f"{stop}")
@@ -318,7 +320,7 @@ class _Layout:
         items: list[Node] = []
         for argument in e.args:
             items += [Word(connective)] if items else []
-            items.append(self.fenced(argument, _PRODUCT))
+            items.append(self.with_brackets(argument, _PRODUCT))
         return Row(tuple(items)), _SUM
 
 
@@ -352,7 +354,7 @@ def entry_index(name: str, shape: tuple[int, int], i: int, j: int) -> str:
 def _number_layout(_: _Layout, e: sp.Number) -> tuple[Node, int]:
     digits = len(str(e.q)) - 1 if isinstance(e, sp.Rational) and e.p == 1 else 0
     if digits > 2 and e.q == 10**digits:
-        return Raised(Word("10"), Word(f"−{digits}")), _POWER
+        return Superscript(Word("10"), Word(f"−{digits}")), _POWER
     if isinstance(e, sp.Rational) and e.q != 1:
         sign: tuple[Node, ...] = (Sign("−"),) if e.p < 0 else ()
         return Row((*sign, Fraction(Word(str(abs(e.p))), Word(str(e.q))))), _PRODUCT
@@ -399,6 +401,6 @@ _RULES: tuple[tuple[type | tuple[type, ...], Rule], ...] = (
     (sp.Piecewise, _Layout.piecewise),
     (Relational, _Layout.relation),
     ((sp.And, sp.Or), _Layout.logic),
-    (sp.Not, lambda p, e: (Row((Word("not "), p.fenced(e.args[0], _ATOM))), _SUM)),
+    (sp.Not, lambda p, e: (Row((Word("not "), p.with_brackets(e.args[0], _ATOM))), _SUM)),
     ((sp.Function, sp.Max, sp.Min), _Layout.function),
 )

@@ -25,7 +25,7 @@ class TextWidth:
         """Whether a block fits in a matrix with this number of columns."""
         return len(text_box(node).lines) == 1 and text_box(node).width <= CELL_WIDTH
 
-    def inner(self, node: Node) -> bool:
+    def fits_inside(self, node: Node) -> bool:
         """Whether a matrix may stay inside a formula that does not fit."""
         return text_box(node).width <= INNER_WIDTH
 

@@ -45,20 +45,20 @@ class _EquationWriter:
 
     def equation(self, shown: Node, right: sp.Basic, rows: tuple[str, ...]) -> list[Node]:
         if isinstance(right, sp.MatrixBase):
-            roots, right = self.rooted(right)
-            lines_ = self.of_rows(shown, right, rows) if rows else self.matrix(shown, right)
+            roots, right = self.name_long_roots(right)
+            lines_ = self.row_lines(shown, right, rows) if rows else self.matrix(shown, right)
             return [*roots, *lines_]
         if not getattr(right, "is_Matrix", False):
             return self.scalar(shown, right)
         line = equation(shown, layout(right))
         if self.measure.line(line):
             return [line]
-        lines = self.hoisted(shown, right) or [line]
+        lines = self.lines_with_named_matrices(shown, right) or [line]
         if isinstance(right, sp.BlockMatrix) and not self.measure.line(lines[0]):
-            return self.of_blocks(shown, right)
+            return self.block_lines(shown, right)
         return lines
 
-    def rooted(self, matrix: sp.MatrixBase) -> tuple[list[Node], sp.MatrixBase]:
+    def name_long_roots(self, matrix: sp.MatrixBase) -> tuple[list[Node], sp.MatrixBase]:
         """Names of long roots that occur repeatedly, and the matrix that uses them."""
         counts = Counter(
             sp.sqrt(node.base)
@@ -69,13 +69,13 @@ class _EquationWriter:
         lines: list[Node] = []
         names: dict[sp.Basic, sp.Basic] = {}
         for root in sorted(counts, key=sp.default_sort_key):
-            if counts[root] > 2 and not self.measure.inner(layout(root)):
+            if counts[root] > 2 and not self.measure.fits_inside(layout(root)):
                 symbol = sp.Symbol(f"l_{len(names) + 1}" if names else "l", positive=True)
                 names |= {root: symbol, 1 / root: 1 / symbol}
                 lines += self.scalar(layout(symbol), root)
         return lines, matrix.xreplace(names) if names else matrix
 
-    def of_rows(self, shown: Node, column: sp.MatrixBase, rows: tuple[str, ...]) -> list[Node]:
+    def row_lines(self, shown: Node, column: sp.MatrixBase, rows: tuple[str, ...]) -> list[Node]:
         assert isinstance(shown, Name)
         lines = []
         for row, entry in zip(rows, column, strict=True):
@@ -87,16 +87,16 @@ class _EquationWriter:
         is_small = max(matrix.shape) <= 6 and matrix.rows * matrix.cols <= 12
         is_partitioned = any(extent in PARTITIONS for extent in matrix.shape)
         if not is_partitioned or recognise_matrix(matrix) is not None:
-            return self.spelled(shown, matrix)
+            return self.matrix_lines(shown, matrix)
         if matrix.cols == 1:
             parts = list(_state_blocks(matrix))
             if all(len(part) == 1 or recognise_matrix(part) is not None for part in parts):
                 line = equation(shown, Table(tuple((layout(part),) for part in parts)))
                 if self.measure.line(line):
                     return [line]
-        return self.spelled(shown, matrix) if is_small else self.blocks(shown, matrix)
+        return self.matrix_lines(shown, matrix) if is_small else self.blocks(shown, matrix)
 
-    def spelled(self, shown: Node, matrix: sp.MatrixBase) -> list[Node]:
+    def matrix_lines(self, shown: Node, matrix: sp.MatrixBase) -> list[Node]:
         """A matrix in one formula, or entry by entry if that is too wide."""
         if matrix.shape == (1, 1):
             return self.scalar(shown, matrix[0, 0])
@@ -121,12 +121,12 @@ class _EquationWriter:
                 if cell is None or not self.measure.cell(cell, len(columns)):
                     position = f"{i + 1}{j + 1}" if len(columns) > 1 else str(i + 1)
                     cell = _indexed_name(shown, f"⟨{position}⟩")
-                    block_definitions += self.spelled(cell, block)
+                    block_definitions += self.matrix_lines(cell, block)
                 cells.append(cell)
             table.append(tuple(cells))
         return [equation(shown, Table(tuple(table))), *block_definitions]
 
-    def of_blocks(self, shown: Node, matrix: sp.BlockMatrix) -> list[Node]:
+    def block_lines(self, shown: Node, matrix: sp.BlockMatrix) -> list[Node]:
         """A matrix by its blocks; blocks that do not fit are named."""
         rows, columns = matrix.blocks.shape
         block_definitions: list[Node] = []
@@ -177,20 +177,20 @@ class _EquationWriter:
             lines += self.scalar(name, piece)
         return lines
 
-    def hoisted(self, shown: Node, right: sp.Basic) -> list[Node]:
+    def lines_with_named_matrices(self, shown: Node, right: sp.Basic) -> list[Node]:
         """A wide expression whose explicit matrices are named and defined below it."""
         names: dict[sp.Basic, Node] = {}
         for matrix in _inner_matrices(right):
             if matrix not in names and recognise_matrix(matrix) is None:
                 is_wide = sp.count_ops(matrix) > MAX_UNSHARED_OPERATIONS
-                if is_wide or not self.measure.inner(layout(matrix)):
+                if is_wide or not self.measure.fits_inside(layout(matrix)):
                     names[matrix] = _indexed_name(shown, f"⟨{len(names) + 1}⟩")
         if not names:
             return []
         lines: list[Node] = [equation(shown, layout(right, names))]
-        return lines + self.stated_all(names)
+        return lines + self.definition_lines(names)
 
-    def stated_all(self, names: Mapping[sp.Basic, Node]) -> list[Node]:
+    def definition_lines(self, names: Mapping[sp.Basic, Node]) -> list[Node]:
         return [line for matrix, name in names.items() for line in self.matrix(name, matrix)]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from .formula_layout import Fence, Fraction, Name, Node, Raised, Root, Row, Sign, Word
+from .formula_layout import Fence, Fraction, Name, Node, Root, Row, Sign, Superscript, Word
 from .symbol_names import GREEK, SymbolName
 
 _SIGN_COMMANDS = {
@@ -73,12 +73,12 @@ def latex_text(node: Node) -> str:
         return _word_text(node.text)
     if isinstance(node, Sign):
         sign = _SIGN_COMMANDS.get(node.text, node.text)
-        return f" {sign} " if node.spaced else sign
+        return f" {sign} " if node.has_spaces else sign
     if isinstance(node, Row):
         return "".join(latex_text(item) for item in node.items)
     if isinstance(node, Fraction):
-        return rf"\frac{{{latex_text(node.above)}}}{{{latex_text(node.below)}}}"
-    if isinstance(node, Raised):
+        return rf"\frac{{{latex_text(node.numerator)}}}{{{latex_text(node.denominator)}}}"
+    if isinstance(node, Superscript):
         return rf"{{{latex_text(node.base)}}}^{{{latex_text(node.exponent)}}}"
     if isinstance(node, Fence):
         return rf"\left{node.left}{latex_text(node.body)}\right{node.right}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from .formula_layout import Fence, Fraction, Name, Node, Raised, Root, Row, Sign, Word
+from .formula_layout import Fence, Fraction, Name, Node, Root, Row, Sign, Superscript, Word
 
 #: Text width in points at a font size of 10 points (LaTeX's article).
 PAGE_WIDTH = 338.0
@@ -23,12 +23,12 @@ def node_width(node: Node) -> float:
     if isinstance(node, Word):
         return 5.6 * len(node.text)
     if isinstance(node, Sign):
-        return _SPACED if node.spaced else _THIN if node.text == " " else 8.0
+        return _SPACED if node.has_spaces else _THIN if node.text == " " else 8.0
     if isinstance(node, Row):
         return sum(map(node_width, node.items))
     if isinstance(node, Fraction):
-        return max(node_width(node.above), node_width(node.below)) + 4.0
-    if isinstance(node, Raised):
+        return max(node_width(node.numerator), node_width(node.denominator)) + 4.0
+    if isinstance(node, Superscript):
         return node_width(node.base) + 0.75 * node_width(node.exponent)
     if isinstance(node, Fence):
         return node_width(node.body) + 2 * (_BRACKET + 3.0)
@@ -109,7 +109,9 @@ def _split_at_signs(node: Row, room: float) -> Iterator[list[Node]]:
     """Parts of a row; each but the first begins with a sign."""
     piece: list[Node] = []
     for atom in _flatten_atoms(node, room):
-        if isinstance(atom, Sign) and (atom.text == "/" or (atom.spaced and atom.text not in "=,")):
+        if isinstance(atom, Sign) and (
+            atom.text == "/" or (atom.has_spaces and atom.text not in "=,")
+        ):
             yield piece
             piece = []
         piece.append(atom)
@@ -128,15 +130,15 @@ def _flatten_atoms(node: Node, room: float) -> Iterator[Node]:
         yield from _flatten_atoms(node.body, room)
         yield Sign(node.right)
     elif isinstance(node, Fraction) and node_width(node) > room:
-        yield from _flatten_atoms(_parenthesise(node.above), room)
+        yield from _flatten_atoms(_parenthesise(node.numerator), room)
         yield Sign("/")
-        yield from _flatten_atoms(_parenthesise(node.below), room)
+        yield from _flatten_atoms(_parenthesise(node.denominator), room)
     elif isinstance(node, Root) and node_width(node) > room:
         yield from _flatten_atoms(Fence("(", node.body, ")"), room)
-        yield Raised(Word(""), Fraction(Word("1"), Word("2")))
-    elif isinstance(node, Raised) and isinstance(node.base, Fence):
+        yield Superscript(Word(""), Fraction(Word("1"), Word("2")))
+    elif isinstance(node, Superscript) and isinstance(node.base, Fence):
         yield from _flatten_atoms(node.base, room)
-        yield Raised(Word(""), node.exponent)
+        yield Superscript(Word(""), node.exponent)
     else:
         yield node
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from html import escape
 
-from .formula_layout import Fence, Fraction, Name, Node, Raised, Root, Row, Sign, Table, Word
+from .formula_layout import Fence, Fraction, Name, Node, Root, Row, Sign, Superscript, Table, Word
 from .symbol_names import GREEK, SymbolName
 
 STYLE = """
@@ -112,8 +112,8 @@ def _node_markup(node: Node) -> str:
     if isinstance(node, Row):
         return f"<mrow>{''.join(_node_markup(item) for item in node.items)}</mrow>"
     if isinstance(node, Fraction):
-        return f"<mfrac>{_node_markup(node.above)}{_node_markup(node.below)}</mfrac>"
-    if isinstance(node, Raised):
+        return f"<mfrac>{_node_markup(node.numerator)}{_node_markup(node.denominator)}</mfrac>"
+    if isinstance(node, Superscript):
         return f"<msup>{_node_markup(node.base)}{_node_markup(node.exponent)}</msup>"
     if isinstance(node, Fence):
         left, right = escape(node.left), escape(node.right)
@@ -134,7 +134,7 @@ def _escape_blanks(text: str) -> str:
 def _sign_markup(sign: Sign) -> str:
     if sign.text == " ":
         return '<mspace width="0.17em"/>'
-    form = ' form="infix"' if sign.spaced else ' form="prefix"'
+    form = ' form="infix"' if sign.has_spaces else ' form="prefix"'
     return f"<mo{form}>{escape(sign.text)}</mo>"
 
 

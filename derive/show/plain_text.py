@@ -6,7 +6,7 @@ import re
 import unicodedata
 from dataclasses import dataclass
 
-from .formula_layout import Fence, Fraction, Name, Node, Raised, Root, Row, Sign, Table, Word
+from .formula_layout import Fence, Fraction, Name, Node, Root, Row, Sign, Superscript, Table, Word
 from .symbol_names import GREEK, SymbolName
 
 WIDTH = 100
@@ -59,15 +59,23 @@ def text_box(node: Node) -> Box:
         return Box((node.text,))
     if isinstance(node, Sign):
         return Box(
-            (f" {node.text} " if node.spaced and node.text != "," else _compact_sign(node.text),)
+            (
+                f" {node.text} "
+                if node.has_spaces and node.text != ","
+                else _compact_sign(node.text),
+            )
         )
     if isinstance(node, Row):
         return _join_boxes([text_box(item) for item in node.items])
     if isinstance(node, Fraction):
         return _join_boxes(
-            [_group_quotient_part(node.above), Box((" / ",)), _group_quotient_part(node.below)]
+            [
+                _group_quotient_part(node.numerator),
+                Box((" / ",)),
+                _group_quotient_part(node.denominator),
+            ]
         )
-    if isinstance(node, Raised):
+    if isinstance(node, Superscript):
         return _join_boxes([text_box(node.base), Box((_exponent_text(node.exponent),))])
     if isinstance(node, Fence):
         inner = text_box(node.body)
@@ -100,7 +108,7 @@ def _group_quotient_part(node: Node) -> Box:
 def _is_simple(node: Node) -> bool:
     if isinstance(node, Row) and len(node.items) == 2:  # function call
         return isinstance(node.items[0], Word) and isinstance(node.items[1], Fence)
-    return isinstance(node, (Name, Word, Fence, Raised, Root))
+    return isinstance(node, (Name, Word, Fence, Superscript, Root))
 
 
 def _exponent_text(node: Node) -> str:
@@ -198,14 +206,14 @@ def _breakable_texts(node: Node) -> list[str]:
     if isinstance(node, Root):
         return _join_groups([["√("], _breakable_texts(node.body), [")"]])
     if isinstance(node, Fraction):
-        parts = (node.above, node.below)
+        parts = (node.numerator, node.denominator)
         above, below = ([p] if _is_simple(p) else ["(", p, ")"] for p in parts)
         groups = [
             [x] if isinstance(x, str) else _breakable_texts(x) for x in (*above, " / ", *below)
         ]
         return _join_groups(groups)
     text = text_box(node).lines[0]
-    breakable = isinstance(node, Sign) and node.spaced and node.text not in "=,"
+    breakable = isinstance(node, Sign) and node.has_spaces and node.text not in "=,"
     return ["", text] if breakable else [text]
 
 

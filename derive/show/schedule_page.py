@@ -172,7 +172,7 @@ class _StepWriter:
 
     def _call(self, step: Call) -> str:
         element, _, name = step.kernel.partition(".")
-        key, name = self._like(element, name)
+        key, name = self._representative_kernel(element, name)
         kernel = next(k for k in self.specs[key].kernels if k.name == name)
         ports = ports_of(step)
         read_ports = [f"{p.name}={ports[p.name]}" for p in kernel.inputs]
@@ -185,7 +185,7 @@ class _StepWriter:
         return f"{step.kernel}({', '.join(read_ports)}) -> {', '.join(written_ports)}{fails}"
 
     @staticmethod
-    def _like(element: str, name: str) -> tuple[tuple[str, str], str]:
+    def _representative_kernel(element: str, name: str) -> tuple[tuple[str, str], str]:
         """Element and kernel with the same ports as the called kernel."""
         if element.startswith("generic{"):
             return ("sweep", f"generic{MAX_SPEEDS}"), name

@@ -141,8 +141,10 @@ def _make_view(
     names: DeclaredNames | None = None,
     before: tuple[Derivation, ...] = (),
 ) -> ElementView:
-    def lowered() -> tuple[KernelIR, ...]:
+    def lowered_kernels() -> tuple[KernelIR, ...]:
         return tuple(kernel.ir() for kernel in kernels)
 
     derivations = (*before, *(k.derivation for k in kernels))
-    return ElementView(name, title, derivations, lowered, c_text, sources, names or DeclaredNames())
+    return ElementView(
+        name, title, derivations, lowered_kernels, c_text, sources, names or DeclaredNames()
+    )

@@ -32,7 +32,7 @@ class SymbolPart(sp.MatrixExpr):
         return self.args[0]
 
     @property
-    def first(self) -> tuple[int, int]:
+    def first_index(self) -> tuple[int, int]:
         return int(self.args[1]), int(self.args[2])
 
     @property
@@ -40,7 +40,7 @@ class SymbolPart(sp.MatrixExpr):
         return (self.args[3], self.args[4])
 
     def _entry(self, i: sp.Expr, j: sp.Expr, **kwargs: object) -> sp.Expr:
-        return self.symbol[self.first[0] + i, self.first[1] + j]
+        return self.symbol[self.first_index[0] + i, self.first_index[1] + j]
 
 
 def recognise_matrix(matrix: sp.MatrixBase) -> sp.MatrixExpr | None:

@@ -135,10 +135,12 @@ def check_hinge(hinge: Hinge) -> HingeMotion:
     _check_units(location, motion)
     q, u, p = motion.q, motion.u, motion.p
     stated_matrices = (
-        ("subspace(q, p)",
-         stated.optional(location, "subspace(q, p)", hinge.subspace, q, p), motion.subspace),
-        ("bias(q, u, p)",
-         stated.optional(location, "bias(q, u, p)", hinge.bias, q, u, p), motion.bias),
+        ("motion_subspace(q, p)",
+         stated.optional(location, "motion_subspace(q, p)", hinge.motion_subspace, q, p),
+         motion.subspace),
+        ("bias_acceleration(q, u, p)",
+         stated.optional(location, "bias_acceleration(q, u, p)", hinge.bias_acceleration, q, u, p),
+         motion.bias),
     )  # fmt: skip
     points = list(_sample_points(motion))
     refuse_jumps(
@@ -164,24 +166,28 @@ _REQUIRED_KEYS = {"crossing": ("axis", "axis2"), "plane": ("axis", "axis2")}
 
 
 def _check_frame(where: str, hinge: Hinge) -> None:
-    """Check `frame` and `keys`, which define how a scene places the hinge."""
-    if hinge.frame not in FRAMES:
+    """Check `frame` and `scene_keys`, which define how a scene places the hinge."""
+    if hinge.frame_rule not in FRAMES:
         frame_names = ", ".join(f'"{frame}"' for frame in FRAMES)
         raise ElementError(
-            f"{where}: frame: expected one of {frame_names}, found {hinge.frame!r:.40}"
+            f"{where}: frame_rule: expected one of {frame_names}, found {hinge.frame_rule!r:.40}"
         )
-    if not isinstance(hinge.keys, tuple) or not set(hinge.keys) <= set(_ALLOWED_KEYS):
+    if not isinstance(hinge.scene_keys, tuple) or not set(hinge.scene_keys) <= set(_ALLOWED_KEYS):
         raise ElementError(
-            f"{where}: keys: expected a tuple of {', '.join(_ALLOWED_KEYS)}, found "
-            f"{hinge.keys!r:.60}"
+            f"{where}: scene_keys: expected a tuple of {', '.join(_ALLOWED_KEYS)}, found "
+            f"{hinge.scene_keys!r:.60}"
         )
-    missing_keys = [key for key in _REQUIRED_KEYS.get(hinge.frame, ()) if key not in hinge.keys]
+    missing_keys = [
+        key for key in _REQUIRED_KEYS.get(hinge.frame_rule, ()) if key not in hinge.scene_keys
+    ]
     if missing_keys:
-        raise ElementError(f'{where}: frame "{hinge.frame}" needs {missing_keys[0]} among the keys')
+        raise ElementError(
+            f'{where}: frame_rule "{hinge.frame_rule}" needs {missing_keys[0]} among the scene_keys'
+        )
     names = [parameter.name for parameter in hinge.parameters]
-    if "lead" in hinge.keys and "lead" not in names:
-        raise ElementError(f"{where}: keys: lead is not a declared parameter; declare it")
-    if hinge.frame == "crossing" and not names:
+    if "lead" in hinge.scene_keys and "lead" not in names:
+        raise ElementError(f"{where}: scene_keys: lead is not a declared parameter; declare it")
+    if hinge.frame_rule == "crossing" and not names:
         raise ElementError(
             f'{where}: frame "crossing": its first parameter is the angle between the axes in rad; '
             "declare it"
@@ -236,14 +242,16 @@ def _check_symbols(where: str, motion: HingeMotion) -> None:
     for label, matrix, names in (
         ("rotation(q, p)", motion.rotation, symbols),
         ("position(q, p)", motion.position, symbols),
-        ("rates(q, u, p)", motion.rates, symbols | {*motion.u}),
+        ("coordinate_rates(q, u, p)", motion.rates, symbols | {*motion.u}),
     ):
         _reject_unknown_symbols(where, label, matrix, names)
     for speed in motion.u:
         if motion.rates.diff(speed).free_symbols & set(motion.u):
-            raise ElementError(f"{where}: rates(q, u, p) must be linear in u: qdot = N(q) u")
+            raise ElementError(
+                f"{where}: coordinate_rates(q, u, p) must be linear in u: qdot = N(q) u"
+            )
     if any(motion.rates.xreplace(dict.fromkeys(motion.u, sp.Integer(0)))):
-        raise ElementError(f"{where}: rates(q, u, p) must vanish with u: qdot = N(q) u")
+        raise ElementError(f"{where}: coordinate_rates(q, u, p) must vanish with u: qdot = N(q) u")
 
 
 def _reject_unknown_symbols(
@@ -318,7 +326,11 @@ def _check_units(where: str, motion: HingeMotion) -> None:
     for rate, coordinate in zip(motion.rates, motion.hinge.coordinates, strict=True):
         unit = f"{coordinate.unit or '1'}/s"
         _check_dimension(
-            where, f"rates(q, u, p), rate of {coordinate.name}", sp.Matrix([rate]), unit, dimensions
+            where,
+            f"coordinate_rates(q, u, p), rate of {coordinate.name}",
+            sp.Matrix([rate]),
+            unit,
+            dimensions,
         )
 
 

@@ -62,10 +62,14 @@ def evaluate_equations(
     with mpmath.workdps(digits):
         values = _Values(digits)
         for quantity in derivation.inputs:
-            values.known[quantity.name] = _read_quantity(quantity, _flatten(inputs[quantity.name]))
+            values.matrices[quantity.name] = _read_quantity(
+                quantity, _flatten(inputs[quantity.name])
+            )
         values.define(derivation, tuple(guards))
         outputs = {q.name: _stored_values(q, values) for q in derivation.outputs}
-        asymmetries = [_asymmetry(values.known[q.name]) for q in derivation.outputs if q.symmetric]
+        asymmetries = [
+            _asymmetry(values.matrices[q.name]) for q in derivation.outputs if q.symmetric
+        ]
         return DirectValue(outputs, max(asymmetries, default=mpmath.mpf(0)))
 
 
@@ -115,7 +119,7 @@ def _stored_values(quantity: Quantity, values: _Values) -> list[Number]:
     rows, columns = quantity.rows, quantity.columns
     if rows * columns == 0:
         return []
-    value = values.known[quantity.name]
+    value = values.matrices[quantity.name]
     return [
         value[i, j] for i in range(rows) for j in range(i if quantity.symmetric else 0, columns)
     ]
@@ -146,14 +150,14 @@ class _Values:
 
     def __init__(self, digits: int) -> None:
         self.digits = digits
-        self.known: dict[str, Matrix] = {}
+        self.matrices: dict[str, Matrix] = {}
         self.scalars: dict[sp.Basic, Number] = {}
 
     def define(self, derivation: Derivation, guards: tuple[tuple[sp.Basic, int, str], ...]) -> None:
         """Evaluate the definitions in order; a guard is checked once its quantities are known."""
         pending_guards = list(guards)
         for equation in derivation.definitions:
-            self.known[str(equation.left.name)] = self.matrix(equation.right)
+            self.matrices[str(equation.left.name)] = self.matrix(equation.right)
             pending_guards = [g for g in pending_guards if not self._check_guard(g)]
         assert not pending_guards, "a guard reads a quantity that no equation defines"
 
@@ -161,7 +165,7 @@ class _Values:
         """Check a guard; return False while its quantities are not known."""
         condition, code, message = guard
         names = {str(s.name) for s in condition.atoms(sp.MatrixSymbol)}
-        if not names <= self.known.keys():
+        if not names <= self.matrices.keys():
             return False
         if not self.truth(condition):
             raise GuardBroken(code, message)
@@ -174,7 +178,7 @@ class _Values:
         if 0 in (height, width):
             return _Empty(height, width)
         if isinstance(e, sp.MatrixSymbol):
-            return self.known[str(e.name)]
+            return self.matrices[str(e.name)]
         if isinstance(e, sp.MatrixBase):
             return mpmath.matrix([[self.scalar(x) for x in e.row(i)] for i in range(height)])
         if isinstance(e, sp.MatAdd):
@@ -199,7 +203,7 @@ class _Values:
             return self._factor(self.matrix(e.matrix))
         if isinstance(e, Triangular):
             lower = self._unit_lower(e.factor)
-            return self._solve(lower.T if e.transposed else lower, e.right)
+            return self._solve(lower.T if e.is_transposed else lower, e.right)
         if isinstance(e, Triangle):
             return self._triangle(self.matrix(e.matrix), e.count)
         raise NotImplementedError(f"cannot evaluate {type(e).__name__}")

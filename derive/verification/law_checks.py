@@ -66,25 +66,25 @@ def _check_coordinate_law(
 
     start_time = mpmath.mpf(0)
     _, slope, _ = central_differences(lambda t: column_vector(law(t, 1)["V"]))
-    worst.see("tau = -dV/dq", law(start_time, 0)["tau"], [-slope[0]], MAX_DIFFERENCE_ERROR)
+    worst.record("tau = -dV/dq", law(start_time, 0)["tau"], [-slope[0]], MAX_DIFFERENCE_ERROR)
     _, rate, _ = central_differences(lambda t: column_vector(law(t, u)["V"]))
     values = law(start_time, u, effort)
-    worst.see(
+    worst.record(
         "P = tau u + dV/dt", values["P"], [values["tau"][0] * u + rate[0]], MAX_DIFFERENCE_ERROR
     )
     friction_power = law(start_time, u)["P"][0]
-    worst.see("dampers and friction dissipate energy", [max(friction_power, 0)], [0], 0.0)
+    worst.record("dampers and friction dissipate energy", [max(friction_power, 0)], [0], 0.0)
 
 
 @dataclass(frozen=True)
 class _RotationLaw:
-    """Law of a ball hinge (`places` = 0) or of a free hinge (3 translations first)."""
+    """Law of a ball hinge (`translation_count` = 0) or of a free hinge (3 translations first)."""
 
     call: Call
     name: str
     p: list[Any]
     axes: list[Any]
-    places: int
+    translation_count: int
 
     def __call__(
         self, q: Any, u: Any, effort: Any = None, reference: Any = 0
@@ -98,18 +98,22 @@ class _RotationLaw:
         undamped_parameters = (
             [*p[:4], 0, 0, 0] if len(p) == 7 else [*p[:6], 0, 0, 0, *p[9:13], 0, 0, 0]
         )
-        return _RotationLaw(self.call, self.name, undamped_parameters, self.axes, self.places)
+        return _RotationLaw(
+            self.call, self.name, undamped_parameters, self.axes, self.translation_count
+        )
 
-    def moved(self, q: list[Any], u: list[Any], t: Number) -> list[Any]:
+    def advance(self, q: list[Any], u: list[Any], t: Number) -> list[Any]:
         """q after t at the velocity u (outboard axes), to second order."""
-        turn, w = q[self.places :], u[self.places :]
+        turn, w = q[self.translation_count :], u[self.translation_count :]
         size = mpmath.sqrt(mpmath.fsum(x * x for x in turn))
         inboard = (
             list(rotation_of_quaternion(column_vector(turn) / size) * column_vector(u[:3]))
-            if self.places
+            if self.translation_count
             else []
         )
-        translations = [x + t * v for x, v in zip(q[: self.places], inboard, strict=True)]
+        translations = [
+            x + t * v for x, v in zip(q[: self.translation_count], inboard, strict=True)
+        ]
         return [*translations, *quaternion_product(turn, rotation_quaternion([t * x for x in w]))]
 
 
@@ -161,29 +165,32 @@ def _swing_twist_quaternion(axis: Matrix, swing: float, numbers: random.Random) 
 
 
 def _check_forces_from_energy(law: _RotationLaw, q: list[Any], worst: WorstErrors) -> None:
-    nu = law.places + 3
+    nu = law.translation_count + 3
     zero_speeds = [0] * nu
     tau = law(q, zero_speeds)["tau"]
 
     def slope(k: int) -> Number:
         unit = [int(i == k) for i in range(nu)]
         return central_differences(
-            lambda t: column_vector(law(law.moved(q, unit, t), zero_speeds)["V"])
+            lambda t: column_vector(law(law.advance(q, unit, t), zero_speeds)["V"])
         )[1][0]
 
     slopes = [-slope(k) for k in range(nu)]
-    worst.see("tau = -dV along the speeds", tau, slopes, MAX_DIFFERENCE_ERROR)
+    worst.record("tau = -dV along the speeds", tau, slopes, MAX_DIFFERENCE_ERROR)
 
 
 def _check_power(
     law: _RotationLaw, q: list[Any], numbers: random.Random, worst: WorstErrors
 ) -> None:
-    u, effort = random_numbers(law.places + 3, numbers), random_numbers(law.places + 3, numbers)
-    _, rate, _ = central_differences(lambda t: column_vector(law(law.moved(q, u, t), u)["V"]))
+    u, effort = (
+        random_numbers(law.translation_count + 3, numbers),
+        random_numbers(law.translation_count + 3, numbers),
+    )
+    _, rate, _ = central_differences(lambda t: column_vector(law(law.advance(q, u, t), u)["V"]))
     values = law(q, u, effort)
     power = mpmath.fsum(a * b for a, b in zip(values["tau"], u, strict=True)) + rate[0]
-    worst.see("P = tau . u + dV/dt", values["P"], [power], MAX_DIFFERENCE_ERROR)
-    worst.see("dampers dissipate energy", [max(law(q, u)["P"][0], 0)], [0], 0.0)
+    worst.record("P = tau . u + dV/dt", values["P"], [power], MAX_DIFFERENCE_ERROR)
+    worst.record("dampers dissipate energy", [max(law(q, u)["P"][0], 0)], [0], 0.0)
 
 
 #: Points on the closed path; the trapezoidal rule converges exponentially on it.
@@ -194,32 +201,35 @@ def _check_closed_path(law: _RotationLaw, worst: WorstErrors) -> None:
     """Work on a closed path through three half turns of twist each way, and the twist on it."""
     # In the axes of the law, so that the twist equals the angle along the path.
     identity = [1, 0, 0, 0, 1, 0, 0, 0, 1]
-    path = _RotationLaw(law.call, law.name, law.p, identity, law.places)
-    translations, zero_speeds = [0] * law.places, [0] * (law.places + 3)
+    path = _RotationLaw(law.call, law.name, law.p, identity, law.translation_count)
+    translations, zero_speeds = [0] * law.translation_count, [0] * (law.translation_count + 3)
     work, twists = mpmath.mpf(0), [mpmath.mpf(0)]
     with mp.workdps(40):
         for k in range(_PATH_POINT_COUNT):
             turn, spin = _path_point(2 * mpmath.pi * k / _PATH_POINT_COUNT)
             values = path([*translations, *turn], zero_speeds, None, twists[-1])
             twists += values["twist"]
-            pairs = zip(values["tau"][law.places :], spin, strict=True)
+            pairs = zip(values["tau"][law.translation_count :], spin, strict=True)
             work += mpmath.fsum(a * b for a, b in pairs) * 2 * mpmath.pi / _PATH_POINT_COUNT
         scale = law.p[-5] * (3 * mpmath.pi) ** 2 / 2
-        worst.see("no work on a closed path", [work / scale], [0], 1e-12)
+        worst.record("no work on a closed path", [work / scale], [0], 1e-12)
         full_twist = 5 * mpmath.pi / 2  # well beyond one turn to either side
         is_unwrapped = [max(twists) > full_twist, min(twists) < -full_twist]
-        worst.see("twist is unwrapped", is_unwrapped, [True, True], 0.0)
+        worst.record("twist is unwrapped", is_unwrapped, [True, True], 0.0)
 
 
 def _path_point(s: Number) -> tuple[list[Any], list[Any]]:
     """(quaternion, angular velocity in body axes) at s of the closed path, 0 <= s < 2 pi."""
 
-    def turn(at: Number) -> list[Any]:
+    def rotation_at(at: Number) -> list[Any]:
         twist_quaternion = rotation_quaternion([0, 0, 3 * mpmath.pi * mpmath.sin(at)])
         swing_vector = [mpmath.mpf(3) / 4 + mpmath.sin(2 * at) / 2, mpmath.cos(at) / 4, 0]
         return quaternion_product(rotation_quaternion(swing_vector), twist_quaternion)
 
     step = mpmath.mpf(10) ** -12
-    quaternion, neighbours = turn(s), zip(turn(s + step), turn(s - step), strict=True)
+    quaternion, neighbours = (
+        rotation_at(s),
+        zip(rotation_at(s + step), rotation_at(s - step), strict=True),
+    )
     rate = [(a - b) / step for a, b in neighbours]  # twice the rate
     return quaternion, quaternion_product([quaternion[0], *(-x for x in quaternion[1:])], rate)[1:]

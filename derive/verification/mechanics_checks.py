@@ -53,27 +53,27 @@ class WorstErrors:
     """Largest error of each property."""
 
     def __init__(self) -> None:
-        self._found: dict[str, tuple[float, float]] = {}
+        self._errors: dict[str, tuple[float, float]] = {}
 
-    def see(self, name: str, got: Matrix, expected: Matrix, limit: float) -> None:
+    def record(self, name: str, got: Matrix, expected: Matrix, limit: float) -> None:
         got, expected = list(got), list(expected)
         scale = max([abs(x) for x in (*got, *expected)] + [mpmath.mpf(1) / 1000])
         gaps = [abs(a - b) / scale for a, b in zip(got, expected, strict=True)]
         error = float(max(gaps, default=0))
         error = error if error == error else float("inf")
-        self._found[name] = (max(error, self._found.get(name, (0.0, 0.0))[0]), limit)
+        self._errors[name] = (max(error, self._errors.get(name, (0.0, 0.0))[0]), limit)
 
     def include(self, other: WorstErrors) -> None:
         """Merge the errors of another collection."""
-        for name, (error, limit) in other._found.items():
-            self._found[name] = (max(error, self._found.get(name, (0.0, 0.0))[0]), limit)
+        for name, (error, limit) in other._errors.items():
+            self._errors[name] = (max(error, self._errors.get(name, (0.0, 0.0))[0]), limit)
 
     @property
     def passed(self) -> bool:
-        return all(error <= limit for error, limit in self._found.values())
+        return all(error <= limit for error, limit in self._errors.values())
 
     def properties(self) -> tuple[Property, ...]:
-        return tuple(Property(name, *found) for name, found in self._found.items())
+        return tuple(Property(name, *found) for name, found in self._errors.items())
 
 
 # --- small matrices -----------------------------------------------------------------------------
@@ -166,7 +166,7 @@ def hinge_properties(
             u, s = random_numbers(nu, numbers), random_numbers(nu, numbers)
             random_state = numbers.getstate()
 
-            def seen(
+            def errors_at(
                 at: list[Any],
                 p: Numbers = p,
                 u: Any = u,
@@ -181,9 +181,9 @@ def hinge_properties(
                 return state_errors
 
             try:
-                point_errors = seen(q)
+                point_errors = errors_at(q)
                 if not point_errors.passed:
-                    point_errors = _check_near_branch(_Hinge(call, p, q, u, [0] * nu), seen)
+                    point_errors = _check_near_branch(_Hinge(call, p, q, u, [0] * nu), errors_at)
                 errors.include(point_errors)
             except ArithmeticError:  # a singular configuration of the coordinates
                 continue
@@ -205,13 +205,13 @@ def _check_near_branch(
     for side in sides:
         computed = [x for name in ("R", "d", "v", "w") for x in outputs[name]]
         expected = [x for name in ("R", "d", "v", "w") for x in side[name]]
-        errors.see("motion is continuous", computed, expected, MAX_JUMP)
+        errors.record("motion is continuous", computed, expected, MAX_JUMP)
     first_bias, second_bias = (side["c"] for side in sides)
     bounded_bias = [
         max(min(a, b), min(max(a, b), c))
         for a, b, c in zip(first_bias, second_bias, outputs["c"], strict=True)
     ]
-    errors.see("bias c lies between both sides", outputs["c"], bounded_bias, MAX_JUMP)
+    errors.record("bias c lies between both sides", outputs["c"], bounded_bias, MAX_JUMP)
     return errors
 
 
@@ -226,13 +226,13 @@ def _check_relative_motion(hinge: _Hinge, nu: int, worst: WorstErrors) -> None:
         raise ArithmeticError("singular coordinates")
     turn, turn_rate, turn_second = central_differences(hinge.rotation)
     _, rate, second_derivative = central_differences(hinge.position)
-    worst.see("R^T R = I", turn.T * turn, mp.eye(3), MAX_ALGEBRA_ERROR)
+    worst.record("R^T R = I", turn.T * turn, mp.eye(3), MAX_ALGEBRA_ERROR)
     velocity = [*(turn.T * rate), *_axial(turn.T * turn_rate)]
-    worst.see(
+    worst.record(
         "velocity by differences", [*outputs["v"], *outputs["w"]], velocity, MAX_DIFFERENCE_ERROR
     )
     if nu:
-        worst.see(
+        worst.record(
             "H u = velocity",
             matrix_of_rows(outputs["H"], nu) * column_vector(hinge.u),
             velocity,
@@ -240,7 +240,7 @@ def _check_relative_motion(hinge: _Hinge, nu: int, worst: WorstErrors) -> None:
         )
     spin_rate = _axial(turn_second * turn.T)
     bias = [*(turn.T * second_derivative), *(turn.T * spin_rate)]
-    worst.see("bias c by differences", outputs["c"], bias, MAX_DIFFERENCE_ERROR)
+    worst.record("bias c by differences", outputs["c"], bias, MAX_DIFFERENCE_ERROR)
 
 
 def _check_bias_motion(hinge: _Hinge, nu: int, numbers: random.Random, worst: WorstErrors) -> None:
@@ -267,7 +267,7 @@ def _check_bias_motion(hinge: _Hinge, nu: int, numbers: random.Random, worst: Wo
     back = turn.T * turn_second
     # R^T R'' = wd~ + w~ w~: its skew part is wd~.
     motion = [*_axial(turn.T * rate), *_axial(back), *(turn.T * acceleration)]
-    worst.see("bias motion by differences", outputs["motion"], motion, MAX_DIFFERENCE_ERROR)
+    worst.record("bias motion by differences", outputs["motion"], motion, MAX_DIFFERENCE_ERROR)
 
 
 def _check_specialised_kernels(
@@ -290,7 +290,7 @@ def _check_specialised_kernels(
     specialised = call("forward", {**inputs, **parameters, "u": u})
     generic_outputs = generic("forward", {**inputs, **relative})
     for name in ("Rc", "r", "motion"):
-        worst.see(
+        worst.record(
             "forward: specialised = generic",
             specialised[name],
             generic_outputs[name],
@@ -301,13 +301,15 @@ def _check_specialised_kernels(
     if any(abs(x) > MAX_ACCELERATION for x in results[1]["udot"]):
         raise ArithmeticError("singular coordinates")
     for name in results[0]:
-        worst.see(
+        worst.record(
             f"{_KERNEL_OF_OUTPUT[name]}: specialised = generic",
             results[0][name],
             results[1][name],
             MAX_ALGEBRA_ERROR,
         )
-    balance.see(results[0], matrix_of_rows(hinge["H"], len(u)) if u else None, [0] * len(u), worst)
+    balance.check_balance(
+        results[0], matrix_of_rows(hinge["H"], len(u)) if u else None, [0] * len(u), worst
+    )
 
 
 _KERNEL_OF_OUTPUT = dict.fromkeys(("G", "g", "S_I", "e_I"), "condense")
@@ -343,7 +345,7 @@ class Balance:
         gains = {"G": condensed["G"], "g": condensed["g"], "delta_I": self.parent}
         return condensed | call("recover", {**connection, **extra, **gains})
 
-    def see(
+    def check_balance(
         self, swept: dict[str, list[Any]], h: Matrix, rotor: list[Any], worst: WorstErrors
     ) -> None:
         turn, lever = matrix_of_rows(self.rotation, 3), cross_product_matrix(self.shift)
@@ -353,18 +355,18 @@ class Balance:
             generalised_load = h.T * force + column_vector(
                 [j * a for j, a in zip(rotor, swept["udot"], strict=True)]
             )
-            worst.see("H^T f + J udot = tau", generalised_load, self.efforts, MAX_ALGEBRA_ERROR)
+            worst.record("H^T f + J udot = tau", generalised_load, self.efforts, MAX_ALGEBRA_ERROR)
         push = turn * force[:3]
         expected_load = [*push, *(turn * force[3:] + lever * push)]
         parent_load = symmetric_matrix(swept["S_I"], 6) * parent + column_vector(swept["e_I"])
-        worst.see("load passed to the parent", parent_load, expected_load, MAX_ALGEBRA_ERROR)
+        worst.record("load passed to the parent", parent_load, expected_load, MAX_ALGEBRA_ERROR)
         translation = turn.T * (parent[:3] - lever * parent[3:])
         expected_motion = [*translation, *(turn.T * parent[3:])]
         if h is not None:
             expected_motion = list(
                 column_vector(expected_motion) + h * column_vector(swept["udot"])
             )
-        worst.see("a = X a_I + H udot", swept["delta"], expected_motion, MAX_ALGEBRA_ERROR)
+        worst.record("a = X a_I + H udot", swept["delta"], expected_motion, MAX_ALGEBRA_ERROR)
 
 
 def sweep_properties(call: Call, nu: int) -> tuple[Property, ...]:
@@ -378,7 +380,7 @@ def sweep_properties(call: Call, nu: int) -> tuple[Property, ...]:
             )
             balance = Balance.drawn(nu, numbers)
             swept = balance.sweep(call, {"H": h, "J": rotor})
-            balance.see(swept, matrix_of_rows(h, nu) if nu else None, rotor, errors)
+            balance.check_balance(swept, matrix_of_rows(h, nu) if nu else None, rotor, errors)
     return errors.properties()
 
 
@@ -406,7 +408,7 @@ def _check_body_power(call: Call, p: list[Any], numbers: random.Random, worst: W
     gyroscopic = call("bias_load", {"p": p, "motion": [*w, 0, 0, 0, 0, 0, 0]})["e"]
     load = call("bias_load", {"p": p, "motion": [*w, *alpha, *a]})["e"]
     expected_load = inertia * column_vector([*a, *alpha]) + column_vector(gyroscopic)
-    worst.see("residual = S a + e", load, expected_load, MAX_ALGEBRA_ERROR)
+    worst.record("residual = S a + e", load, expected_load, MAX_ALGEBRA_ERROR)
     v_rate = a - cross_product_matrix(w) * v
 
     def energy(t: Number) -> Matrix:
@@ -414,7 +416,7 @@ def _check_body_power(call: Call, p: list[Any], numbers: random.Random, worst: W
         return column_vector(call("energy", {"p": p, **velocities})["T"])
 
     power = (expected_load.T * column_vector([*v, *w]))[0]
-    worst.see(
+    worst.record(
         "power of the residual = dT/dt",
         [power],
         central_differences(energy)[1],
@@ -441,7 +443,7 @@ def _check_force_power(
         "effort": random_numbers(1, numbers),
     }
 
-    def at(t: Number) -> dict[str, list[Any]]:
+    def values_at(t: Number) -> dict[str, list[Any]]:
         inputs = dict(common_inputs)
         for name, (axes, x, v, w) in ends.items():
             rotated_axes = (
@@ -453,13 +455,13 @@ def _check_force_power(
             inputs |= {f"v_{name}": list(v), f"w_{name}": list(w)}
         return call("wrench", inputs)
 
-    outputs = at(mpmath.mpf(0))
-    _, rate, _ = central_differences(lambda t: column_vector(at(t)["V"]))
+    outputs = values_at(mpmath.mpf(0))
+    _, rate, _ = central_differences(lambda t: column_vector(values_at(t)["V"]))
     force, moment = column_vector(outputs["F"]), column_vector(outputs["M"])
     (_, x_f, v_f, w_f), (_, x_t, v_t, w_t) = ends["F"], ends["T"]
     back = -moment - cross_product_matrix(x_t - x_f) * force
     power = force.T * (v_t - v_f) + moment.T * w_t + back.T * w_f
-    worst.see(
+    worst.record(
         "power on both ends = P - dV/dt", power, [outputs["P"][0] - rate[0]], MAX_DIFFERENCE_ERROR
     )
 

@@ -58,7 +58,7 @@ class PreciseArithmetic:
                 a, b = context.sign(a), context.sign(b)
             return real(context.atan2)(a, b)
 
-        library = [name for name, row in OPERATIONS.items() if row.of_the_library]
+        library = [name for name, row in OPERATIONS.items() if row.is_c_library_function]
         self.operations: dict[str, Function] = {
             **{name: row.value for name, row in OPERATIONS.items()},
             **{name: real(getattr(context, name)) for name in library},

@@ -83,7 +83,7 @@ class _BoundedArithmetic:
         def call(name: str, *args: Any) -> Any:
             return operations[name](*args)
 
-        def passed_on(slope: Slope, value: Any, a: BoundedValue) -> Any:
+        def carried_error(slope: Slope, value: Any, a: BoundedValue) -> Any:
             # An exact operand adds no error, even where the slope is unbounded.
             try:
                 return a.error and abs(slope(call, value, (a.value,), (a.error,)))
@@ -91,11 +91,11 @@ class _BoundedArithmetic:
                 return operations["div"](a.error, exact.number(0))
 
         def smooth(name: str, slope: Slope) -> Callable[[BoundedValue], BoundedValue]:
-            def rounded(a: BoundedValue) -> BoundedValue:
+            def bounded_result(a: BoundedValue) -> BoundedValue:
                 value = operations[name](a.value)
-                return _round_value(value, passed_on(slope, value, a), 2)
+                return _round_value(value, carried_error(slope, value, a), 2)
 
-            return rounded
+            return bounded_result
 
         def divide(a: BoundedValue, b: BoundedValue) -> BoundedValue:
             value = operations["div"](a.value, b.value)
@@ -129,7 +129,9 @@ class _BoundedArithmetic:
         rows = OPERATIONS.values()
         self.operations: dict[str, Callable[..., BoundedValue]] = {
             **{r.name: exactly(r.name) for r in rows if r.slope is None},
-            **{r.name: smooth(r.name, r.slope) for r in rows if r.slope and r.of_the_library},
+            **{
+                r.name: smooth(r.name, r.slope) for r in rows if r.slope and r.is_c_library_function
+            },
             "neg": lambda a: -a,
             "add": lambda a, b: a + b,
             "sub": lambda a, b: a - b,

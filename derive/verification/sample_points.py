@@ -24,7 +24,7 @@ _QUATERNION_LETTERS = "wxyz"
 _SQRT_HALF = math.sqrt(0.5)
 
 #: Angle of every angular coordinate, and the equivalent quaternion.
-_TURNS: dict[str, tuple[float, tuple[float, float, float, float]]] = {
+_ROTATIONS: dict[str, tuple[float, tuple[float, float, float, float]]] = {
     "rest": (0.0, (1.0, 0.0, 0.0, 0.0)),
     "quarter turn": (math.pi / 2, (_SQRT_HALF, _SQRT_HALF, 0.0, 0.0)),
     "quarter turn back": (-math.pi / 2, (_SQRT_HALF, 0.0, 0.0, -_SQRT_HALF)),
@@ -83,7 +83,7 @@ class InputSampler:
             return
         yield self._rest_point(kernel, numbers)
         if self.kind == "hinge" and "q" in names:
-            for label in list(_TURNS)[1:]:
+            for label in list(_ROTATIONS)[1:]:
                 inputs = self._draw_inputs(kernel, numbers)
                 inputs["q"] = self.coordinate_values(numbers, label)
                 yield Point(label, inputs)
@@ -141,9 +141,9 @@ class InputSampler:
             )
             value = numbers.uniform(low, high)
             if turn is not None and entry_index >= 0:
-                value = _TURNS[turn][1][entry_index]
+                value = _ROTATIONS[turn][1][entry_index]
             elif turn is not None and (c.unit == "rad" or turn == "rest"):
-                value = min(max(_TURNS[turn][0], low if c.minimum is not None else -math.inf),
+                value = min(max(_ROTATIONS[turn][0], low if c.minimum is not None else -math.inf),
                             high if c.maximum is not None else math.inf)  # fmt: skip
             values.append(value)
         return values
@@ -218,7 +218,7 @@ Change = Callable[[dict[str, Numbers]], None]
 
 
 def _limit_points() -> Iterator[tuple[str, Change]]:
-    def at(q: float, u: float | None = None) -> Change:
+    def state_change(q: float, u: float | None = None) -> Change:
         def change(inputs: dict[str, Numbers]) -> None:
             inputs["q"] = [q]
             if u is not None:
@@ -226,23 +226,23 @@ def _limit_points() -> Iterator[tuple[str, Change]]:
 
         return change
 
-    yield "no speed", at(0.25, 0.0)
-    yield "tiny speed", at(0.25, 1e-200)
-    yield "fast", at(0.25, 1e8)
-    yield "into the upper limit", at(0.875, 0.5)
-    yield "into the lower limit", at(-0.875, -0.5)
-    yield "thrown off the upper limit", at(0.8125, -1e3)
-    yield "on the limit", at(0.75)
-    yield "on the lower limit, still", at(-0.5, 0.0)
+    yield "no speed", state_change(0.25, 0.0)
+    yield "tiny speed", state_change(0.25, 1e-200)
+    yield "fast", state_change(0.25, 1e8)
+    yield "into the upper limit", state_change(0.875, 0.5)
+    yield "into the lower limit", state_change(-0.875, -0.5)
+    yield "thrown off the upper limit", state_change(0.8125, -1e3)
+    yield "on the limit", state_change(0.75)
+    yield "on the lower limit, still", state_change(-0.5, 0.0)
 
-    def without(inputs: dict[str, Numbers]) -> None:
+    def remove_limits(inputs: dict[str, Numbers]) -> None:
         inputs["p"][7:9] = [-1e300, 1e300]
 
-    yield "no limits", without
+    yield "no limits", remove_limits
 
 
 def _swing_points() -> Iterator[tuple[str, Change]]:
-    def at(
+    def rotation_change(
         share: float, direction: float, twist: float, reference: float = 0.0, still: bool = False
     ) -> Change:
         """Squared half-sine of the swing, its direction, the twist."""
@@ -260,14 +260,14 @@ def _swing_points() -> Iterator[tuple[str, Change]]:
 
         return change
 
-    yield "no rotation", at(0.0, 0.0, 0.0, still=True)
-    yield "twist alone", at(0.0, 0.0, 1.25)
-    yield "tiny swing", at(1e-30, 0.5, -0.5)
-    yield "below the switch of the series", at(0.01 * (1 - 1e-9), 0.5, 0.75)
-    yield "above the switch of the series", at(0.01 * (1 + 1e-9), 0.5, 0.75)
-    yield "wide swing", at(0.995, 2.0, 0.5)
-    yield "three turns of twist", at(0.25, 1.0, 0.5, 6 * math.pi + 0.4)
-    yield "turns back", at(0.25, 1.0, -0.5, -8 * math.pi + 0.4)
+    yield "no rotation", rotation_change(0.0, 0.0, 0.0, still=True)
+    yield "twist alone", rotation_change(0.0, 0.0, 1.25)
+    yield "tiny swing", rotation_change(1e-30, 0.5, -0.5)
+    yield "below the switch of the series", rotation_change(0.01 * (1 - 1e-9), 0.5, 0.75)
+    yield "above the switch of the series", rotation_change(0.01 * (1 + 1e-9), 0.5, 0.75)
+    yield "wide swing", rotation_change(0.995, 2.0, 0.5)
+    yield "three turns of twist", rotation_change(0.25, 1.0, 0.5, 6 * math.pi + 0.4)
+    yield "turns back", rotation_change(0.25, 1.0, -0.5, -8 * math.pi + 0.4)
 
 
 # --- numbers ----------------------------------------------------------------------------------

@@ -32,11 +32,14 @@ def main() -> None:
     """All three statements."""
     model = mstmm.compile(mstmm.load_scene(SCENE))
     loops = model.loops
-    print(f"cut: {', '.join(loops.cut)}; {loops.rank} of {len(loops.rows)} rows count")
-    assert (len(loops.rows), loops.rank, loops.mobility) == (15, 6, 1)
+    print(
+        f"cut: {', '.join(loops.cut_hinges)}; {loops.rank} of {len(loops.constraint_rows)} rows "
+        f"count"
+    )
+    assert (len(loops.constraint_rows), loops.rank, loops.mobility) == (15, 6, 1)
 
     udot = model.accelerations(*model.initial_state())
-    at = {name: model.layout.hinges[name].u for name in ANGLES}
+    at = {name: model.coordinate_layout.hinges[name].u for name in ANGLES}
     for name in ANGLES:
         found = float(udot[at[name]])
         wanted = STARTING.get(name, 0.0)
@@ -47,7 +50,7 @@ def main() -> None:
             0.03, "dop853", rtol=rtol, atol=1e-3 * rtol, output_times=[0.0, 0.03]
         )
         assert result.success, result.message
-        q = {name: float(result.q[-1, model.layout.hinges[name].q]) for name in ANGLES}
+        q = {name: float(result.q[-1, model.coordinate_layout.hinges[name].q]) for name in ANGLES}
         apart = max(abs(q[name] - wanted) for name, wanted in ANGLES.items())
         steps = result.statistics
         assert steps is not None

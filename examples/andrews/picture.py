@@ -72,7 +72,7 @@ def draw(path: Path) -> None:
             axes.text(0.007, -0.012, "crank", ha="center", fontsize=8)
     axes = figure.add_subplot(grid[:, 4])
     for name in ("beta", "Theta", "gamma", "delta", "Phi", "eps"):
-        angle = result.q[:, model.layout.hinges[name].q_slice][:, 0]
+        angle = result.q[:, model.coordinate_layout.hinges[name].q_slice][:, 0]
         wrapped = np.mod(angle + np.pi, 2 * np.pi) - np.pi
         wrapped[np.abs(np.diff(wrapped, append=wrapped[-1])) > np.pi] = np.nan
         axes.plot(1e3 * result.t, wrapped, label=name, lw=1.4)

@@ -69,12 +69,14 @@ def main() -> None:
     """All three statements."""
     model = mstmm.compile(mstmm.load_scene(SCENE))
     loops = model.loops
-    print(f"cut: {loops.cut[0]}; {loops.rank} of {len(loops.rows)} rows count")
-    assert (len(loops.rows), loops.rank, loops.mobility) == (5, 4, 1)
+    print(
+        f"cut: {loops.cut_hinges[0]}; {loops.rank} of {len(loops.constraint_rows)} rows independent"
+    )
+    assert (len(loops.constraint_rows), loops.rank, loops.mobility) == (5, 4, 1)
 
     result = model.simulate(10.0, rtol=1e-9, output_times=TIMES)
     assert result.success, result.message
-    pins = [model.layout.hinges[f"pin{k}"].q_slice.start for k in range(1, 6)]
+    pins = [model.coordinate_layout.hinges[f"pin{k}"].q_slice.start for k in range(1, 6)]
     q = result.q[:, pins].T
     kept = np.abs((1 + np.sin(q[0])) * (1 + np.sin(q[1])) - 1).max()
     alike = np.abs(q - angles(q[0], q[1])).max()

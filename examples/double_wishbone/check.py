@@ -1,6 +1,6 @@
 """A corner of a car over a bump, then steered, against geometry and Lagrange's equations.
 
-Statements: (1) balls close two loops by six rows that all count, and two motions are left.  (2) The
+Statements: (1) balls close two loops by six independent rows, and the mobility is 2.  (2) The
 car stands still before the bump.  (3) Over three seconds upright and tie rod are where circles and
 spheres put them for the angle of the lower wishbone and the place of the rack, to 1e-9 m, and loops
 are closed.  (4) Accelerations of car and wishbone are those of Lagrange's equations for thirty mass
@@ -32,7 +32,7 @@ def places(heave: float, angle: float, rack: float) -> np.ndarray:
 
 def moved(result: mstmm.Result) -> tuple[np.ndarray, np.ndarray]:
     """q and u (times, 4) of heave, lower wishbone, rack and road."""
-    slots = [result.model.layout.hinges[name] for name in DRIVEN]
+    slots = [result.model.coordinate_layout.hinges[name] for name in DRIVEN]
     return result.q[:, [one.q for one in slots]], result.u[:, [one.u for one in slots]]
 
 
@@ -46,9 +46,12 @@ def main() -> None:
     """All five statements."""
     model = mstmm.compile(mstmm.load_scene(SCENE))
     loops = model.loops
-    print(f"cut: {', '.join(loops.cut)}; {loops.rank} of {len(loops.rows)} rows count")
+    print(
+        f"cut: {', '.join(loops.cut_hinges)}; {loops.rank} of {len(loops.constraint_rows)} rows "
+        f"count"
+    )
     # A drive for the rack, one for the road.
-    assert (len(loops.rows), loops.rank, loops.mobility) == (6, 6, 2)
+    assert (len(loops.constraint_rows), loops.rank, loops.mobility) == (6, 6, 2)
 
     result = model.simulate(3.0, rtol=1e-8, output_times=np.linspace(0.0, 3.0, 151))
     assert result.success, result.message

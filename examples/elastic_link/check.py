@@ -136,7 +136,7 @@ def main() -> None:
     scene, nodes = mstmm.load_scene(HERE / "scene.toml"), Nodes()
     times = np.linspace(0.0, END, 141)
     model = mstmm.compile(scene, engine="looped")
-    body = model.flexible["link"]
+    body = model.flexible_bodies["link"]
 
     ends = [(w * h, w, h) for w, h in ((0.05, 0.016), (0.03, 0.01))]
     middle = (0.04) * (0.013)

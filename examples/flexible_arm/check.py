@@ -136,7 +136,7 @@ def main() -> None:
     errors = []
     for modes in (2, 3, 4):
         result = run(data, modes)
-        pair = (result.coordinate(name)[:, 0] for name in ("shoulder", "elbow"))
+        pair = (result.coordinates(name)[:, 0] for name in ("shoulder", "elbow"))
         joints = np.stack(list(pair), 1)
         found = (
             abs(result.position("payload")[:, :2] - place).max(), abs(joints - angles).max(),

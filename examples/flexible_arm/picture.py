@@ -24,7 +24,7 @@ def draw(path: Path) -> None:
     model = mstmm.compile(mstmm.load_scene(HERE / "scene.toml"))
     result = model.simulate(1.2, rtol=1e-6, output_times=np.linspace(0, 1.2, 481))
     figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.4))
-    lines = {name: result.shape(name) for name in ("upper", "lower")}
+    lines = {name: result.deflected_shape(name) for name in ("upper", "lower")}
     payload = result.position("payload")
     left.plot(payload[:, 0], payload[:, 1], color="#c1121f", lw=0.8)
     for row in range(0, 481, 40):

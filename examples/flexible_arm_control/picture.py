@@ -41,7 +41,7 @@ def draw(path: Path) -> None:
     for (name, result), colour in zip(found.items(), ("#1d3557", "#f4791f"), strict=True):
         left.plot(times, result.position("arm.tip")[:, 1], color=colour, label=name)
         middle.plot(times, result.quantity("motor").values, color=colour, lw=0.9)
-    line = found["LQR with observer"].shape("arm")
+    line = found["LQR with observer"].deflected_shape("arm")
     for row in range(0, 301, 25):
         right.plot(line[row, :, 0], line[row, :, 1], color=plt.colormaps["viridis"](row / 330))
     left.set(xlabel="time, s", ylabel="tip from its goal, m", title="Where the tip is")

@@ -61,8 +61,10 @@ def main() -> None:
     """All four statements."""
     model = mstmm.compile(mstmm.load_scene(SCENE))
     loops = model.loops
-    print(f"cut: {loops.cut[0]}; {loops.rank} of {len(loops.rows)} rows count")
-    assert (loops.rank, len(loops.rows), loops.mobility) == (2, 5, 0)
+    print(
+        f"cut: {loops.cut_hinges[0]}; {loops.rank} of {len(loops.constraint_rows)} rows independent"
+    )
+    assert (loops.rank, len(loops.constraint_rows), loops.mobility) == (2, 5, 0)
 
     times = np.linspace(0.0, 3 * TURN, 601)
     result = model.simulate(3 * TURN, rtol=1e-10, output_times=times)

@@ -73,7 +73,7 @@ def main() -> None:
         power = float(abs(found["motor_power"] - force * x(times, 1)).max())
         print(f"brake {brake:g} N m s, wind {wind}: sway up to {abs(found['sway']).max():.2f} deg")
         print(f"  apart: sway {sway:.1e} deg, ahead {ahead:.1e} m, power {power:.1e} W")
-        assert abs(result.speed("swing")[:, 0] - rate).max() < 1e-8
+        assert abs(result.speeds("swing")[:, 0] - rate).max() < 1e-8
         assert sway < 1e-6 and ahead < 1e-8 and power < 1e-6
         balance = float(np.ptp(result.energy() - result.work))
         assert balance < 1e-6, balance

@@ -64,7 +64,7 @@ def numbers(result: mstmm.Result) -> Array:
     at = 1000  # the release
     v = result.equivalent_velocity("javelin")[at]
     center = result.center_of_mass("javelin")[at]
-    spin = result.equivalent_spin("javelin")[at, 2]
+    spin = result.equivalent_angular_velocity("javelin")[at, 2]
     apex, distance = v[1] ** 2 / (2 * GRAVITY), 2 * v[0] * v[1] / GRAVITY
     return np.array([v[0], v[1], spin, center[0], center[1], apex, distance])
 
@@ -94,7 +94,7 @@ def check_flight(name: str, result: mstmm.Result) -> None:
     throw, flight = slice(0, 1000), slice(1000, None)
     t, v = result.t[flight] - RELEASE, result.equivalent_velocity("javelin")
     fall = v[flight] - v[1000] - np.outer(t, [0, -GRAVITY, 0])
-    spin = np.ptp(result.equivalent_spin("javelin")[flight, 2])
+    spin = np.ptp(result.equivalent_angular_velocity("javelin")[flight, 2])
     force = result.force("throw")[throw] + MASS * np.array([0, -GRAVITY, 0])
     blow = simpson(force, x=result.t[throw], axis=0) - MASS * v[999]
     print(f"  flight: V_RB {abs(fall).max():.1e} m/s, w_RB {spin:.1e} rad/s off; ", end="")
@@ -118,7 +118,7 @@ class Constrained:
         first = start[:2] - [np.cos(start[2]), np.sin(start[2])]
         hinge["initial"] = {"q": [*first, start[2]], "u": [0.0, 0.0, 0.0]}
         self.model = mstmm.compile(mstmm.Scene(**data))
-        ports = self.model.flexible["javelin"].ports
+        ports = self.model.flexible_bodies["javelin"].ports
         self.arm = (ports["mid"].position - ports["root"].position)[:2]
         self.bent = (ports["mid"].phi - ports["root"].phi)[:2]
         self.tilt, self.root = ports["mid"].theta[2], ports["root"].theta[2]
@@ -169,7 +169,10 @@ def check_constraints() -> None:
         off, thrown = Constrained(**{k: v for k, v in keys.items() if k != "modes"}).thrown()
         pairs = [
             (thrown.equivalent_velocity("javelin")[0], driven.equivalent_velocity("javelin")[-1]),
-            (thrown.equivalent_spin("javelin")[0], driven.equivalent_spin("javelin")[-1]),
+            (
+                thrown.equivalent_angular_velocity("javelin")[0],
+                driven.equivalent_angular_velocity("javelin")[-1],
+            ),
             (thrown.center_of_mass("javelin")[0], driven.center_of_mass("javelin")[-1]),
         ]
         apart = max(float(abs(a - b).max()) for a, b in pairs)

@@ -57,8 +57,10 @@ def main() -> None:
     for count in (2, 40):
         model = mstmm.compile(windows(count))
         loops = model.loops
-        assert (len(loops.rows), loops.rank, loops.mobility) == (5 * count, 2 * count, 1)
-        cranks = [model.layout.hinges[f"foot{k}"].q_slice.start for k in range(count + 1)]
+        assert (len(loops.constraint_rows), loops.rank, loops.mobility) == (5 * count, 2 * count, 1)
+        cranks = [
+            model.coordinate_layout.hinges[f"foot{k}"].q_slice.start for k in range(count + 1)
+        ]
         wanted = pendulum(count)
         for rtol, bound in ((1e-6, 1e-3), (1e-9, 1e-6)):
             result = model.simulate(10.0, "dop853", rtol=rtol, atol=1e-3 * rtol, output_times=TIMES)

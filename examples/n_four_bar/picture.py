@@ -41,7 +41,7 @@ def draw(path: Path) -> None:
     left.set_aspect("equal")
 
     model, wanted = mstmm.compile(windows(40)), pendulum(40)
-    crank = model.layout.hinges["foot0"].q_slice.start
+    crank = model.coordinate_layout.hinges["foot0"].q_slice.start
     flat = TIMES[1:][np.diff(np.floor(wanted / np.pi)) != 0]
     for time in flat:
         right.axvline(time, color="0.85", lw=1)

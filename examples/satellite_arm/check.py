@@ -79,7 +79,7 @@ def check_momentum(data: dict[str, Any]) -> None:
     reported = max(
         float(abs(result.momentum() - P).max()),
         float(abs(result.angular_momentum() - L).max()),
-        float(abs(result.energies()["kinetic"] - T).max()),
+        float(abs(result.energy_components()["kinetic"] - T).max()),
         float(abs(result.work - result.work[0] - work).max()),
     )
     print(f"momentum {linear:.1e} N s, {angular:.1e} N m s of {np.linalg.norm(L[0]):.2f}")

@@ -38,7 +38,7 @@ def draw(path: Path) -> None:
     space = figure.add_subplot(122, projection="3d")
     for row, shade in ((0, "#472d7b"), (250, "#21918c"), (600, "#a0da39")):
         for panel in ("east", "west"):
-            line = result.shape(panel)[row]
+            line = result.deflected_shape(panel)[row]
             space.plot(*line.T, color=shade, lw=2.5)
         space.plot([], [], color=shade, lw=2.5, label=f"{result.t[row]:.0f} s")
         space.scatter(*result.position("hub")[row], color=shade, s=60, marker="s")

@@ -67,7 +67,7 @@ def raised(units: int, samples: int) -> None:
     """Statements 1 to 3 for a mast of so many units."""
     model = mstmm.compile(mast(units), engine="looped")
     loops = model.loops
-    assert (len(loops.cut), len(loops.rows)) == (units, 5 * units)
+    assert (len(loops.cut_hinges), len(loops.constraint_rows)) == (units, 5 * units)
     assert (loops.rank, loops.mobility, loops.singular) == (2 * units, 0, False)
 
     times = np.linspace(0.0, TIME, samples)

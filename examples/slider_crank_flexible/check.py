@@ -98,8 +98,8 @@ def main() -> None:
     model = mstmm.compile(mstmm.load_scene(SCENE))
     result = model.simulate(T_END, rtol=1e-9, atol=1e-11, output_times=[T_SHORT, T_END])
     assert result.success, result.message
-    sliders = result.coordinate("guide")[:, 0]
-    found = result.q[:, model.layout.modal["rod"].q_slice]
+    sliders = result.coordinates("guide")[:, 0]
+    found = result.q[:, model.coordinate_layout.modal["rod"].q_slice]
     off, bent = abs(sliders[-1] - PUBLISHED_SLIDER), np.abs(found[-1, :2] - PUBLISHED[1:3]).max()
     print(f"slider off by {off:.1e} m, bending by {bent:.1e} m")
     assert off < 1e-6

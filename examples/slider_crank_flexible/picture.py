@@ -27,7 +27,7 @@ def draw(path: Path) -> None:
     model = mstmm.compile(mstmm.load_scene(HERE / "scene.toml"))
     times = np.linspace(0.0, 0.1, 2001)
     result = model.simulate(0.1, rtol=1e-8, atol=1e-10, output_times=times)
-    modes = result.q[:, model.layout.modal["rod"].q_slice]
+    modes = result.q[:, model.coordinate_layout.modal["rod"].q_slice]
     figure, axes = plt.subplot_mosaic("aa;bc", figsize=(10, 5.6), height_ratios=(1.15, 1))
     above, left, right = (axes[name] for name in "abc")
     turn, x = 2 * np.pi / 150.0, np.linspace(0, 1, 60)

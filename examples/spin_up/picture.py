@@ -46,7 +46,7 @@ def draw(path: Path) -> None:
         title="Against the turning root direction",
     )  # fmt: skip
     left.legend(frameon=False)
-    lines = stiff.shape("blade")
+    lines = stiff.deflected_shape("blade")
     for row in range(0, 181, 20):  # every second
         colour = plt.colormaps["viridis"](row / 200)
         right.plot(lines[row, :, 0], lines[row, :, 1], color=colour, lw=1.6)

@@ -67,11 +67,13 @@ def check_modes(every: Array) -> None:
     print("   Hz  damping  without  of all nodes   moves most")
     for k in range(11):
         hertz = [x / (2 * np.pi) for x in (modes.omega[k], undamped.omega[k], every[k])]
-        print(f"{hertz[0]:6.3f}  {modes.damping[k]:.4f}  {hertz[1]:7.4f}  {hertz[2]:9.5f}      "
-              f"{', '.join(modes.moving(k)[:3])}")  # fmt: skip
-    assert undamped.complete and np.abs(undamped.omega[:11] / every[:11] - 1).max() < 1e-4
+        print(
+            f"{hertz[0]:6.3f}  {modes.damping_ratio[k]:.4f}  {hertz[1]:7.4f}  {hertz[2]:9.5f}      "
+            f"{', '.join(modes.dominant_coordinates(k)[:3])}"
+        )
+    assert undamped.is_complete and np.abs(undamped.omega[:11] / every[:11] - 1).max() < 1e-4
     mass = 9500.0 + 90.0 + 160.0 + 2 * 230.4473927787
-    total = undamped.effective_mass.sum(axis=0)
+    total = undamped.effective_modal_mass.sum(axis=0)
     print(f"effective masses add up to {total.round(4)} of {mass:.4f} kg")
     np.testing.assert_allclose(total, mass, rtol=1e-9)
 
@@ -83,7 +85,7 @@ def check_shapes(whole: Any, every: Array) -> None:
     for count, bounds in {8: (1e-4, 2e-2), 24: (1e-5, 1e-3), 48: (1e-7, 2e-6),
                           99: (1e-7, 1e-8)}.items():  # fmt: skip
         linear = model(count).linearize(inputs=INPUTS)
-        found = linear.frequency_response(OMEGA, outputs=OUTPUTS).values
+        found = linear.frequency_response(OMEGA, outputs=OUTPUTS).response
         apart = np.abs(linear.modes(damped=False).omega[:11] / every[:11] - 1).max()
         tips = np.abs(found / reference - 1).max()
         print(f"{count:5}: {apart:.1e}, {tips:.1e}")
@@ -93,7 +95,7 @@ def check_shapes(whole: Any, every: Array) -> None:
 def check_dense() -> None:
     """The sweep, frequency by frequency, against the matrices."""
     linear = model().linearize(inputs=INPUTS)
-    found = linear.frequency_response(OMEGA, outputs=linear.coordinates).values
+    found = linear.frequency_response(OMEGA, outputs=linear.coordinate_names).response
     worst = 0.0
     for w, values in zip(OMEGA, found, strict=True):
         dense = np.linalg.solve(linear.K + 1j * w * linear.C - w**2 * linear.M, linear.V)
@@ -115,7 +117,7 @@ def check_run(hertz: float, periods: int, inputs: dict[str, Any], pushes: list[c
     scene = model()
     linear = scene.linearize(inputs=INPUTS)
     omega = 2 * np.pi * hertz
-    answer = linear.frequency_response([omega], outputs=OUTPUTS).values[0] @ np.array(pushes)
+    answer = linear.frequency_response([omega], outputs=OUTPUTS).response[0] @ np.array(pushes)
     times = np.linspace((periods - 1) / hertz, periods / hertz, 25)
     run = scene.simulate(
         times[-1], initial=(linear.state.q, linear.state.u), inputs=inputs, output_times=times,

@@ -31,7 +31,7 @@ def draw(path: Path) -> None:
     model = check.model()
     linear = model.linearize(inputs=check.INPUTS)
     omega, coarse = (2 * np.pi * np.geomspace(0.03, 6, count) for count in (400, 45))
-    swept = linear.frequency_response(omega, outputs=check.OUTPUTS).values
+    swept = linear.frequency_response(omega, outputs=check.OUTPUTS).response
     nodes = check.Whole().response(coarse)
     figure, axes = plt.subplots(2, 2, figsize=(10, 6.4))
     for k, name in enumerate(check.OUTPUTS):
@@ -59,7 +59,7 @@ def draw(path: Path) -> None:
 def _trapezoid(model: Any, axis: Any) -> None:
     """How fast the boom swings, over the width of the trapezoid at the boom."""
     widths = np.linspace(0.28, 0.8, 27)
-    locus = model.locus("constants.b", widths, 1)
+    locus = model.root_locus("constants.b", widths, 1)
     axis.plot(widths, np.abs(locus.eigenvalues[:, 0]) / (2 * np.pi), color="#1d3557")
     axis.plot([0.5], [0.1143], "o", color="#c1121f", ms=5, label="the scene")
     axis.set(xlabel="b, half the width at the boom, m", ylabel="swing, Hz", ylim=(0, None),

@@ -21,10 +21,7 @@ RPM = 2 * np.pi / 60
 Array = NDArray[np.float64]
 
 #: Nelson and McVaugh (1976): whirl speeds in rpm where the spin is this part of them.
-PUBLISHED = {
-    1.0: (15470, 17159, 46612, 49983, 64752),
-    0.5: (15858, 16700, 47520, 49204, 69640),
-}
+PUBLISHED = {1.0: (15470, 17159, 46612, 49983, 64752), 0.5: (15858, 16700, 47520, 49204, 69640)}
 #: Their orthotropic bearings, N/m.
 ORTHOTROPIC = np.array([[3.503e7, -8.756e6], [-8.756e6, 3.503e7]])
 
@@ -70,7 +67,7 @@ def check_published(model: mstmm.Model) -> None:
     worst = 0.0
     for part, speeds in PUBLISHED.items():
         for known in speeds:
-            locus = model.locus("constants.spin", [part * known * RPM])
+            locus = model.root_locus("constants.spin", [part * known * RPM])
             assert locus.frame == "fixed"
             worst = max(worst, abs(near(locus.frequency[0] * 60, known) / known - 1))
     print(f"isotropic bearings: whirl speeds as published to {worst:.1e}")
@@ -81,7 +78,7 @@ def check_elements(model: mstmm.Model, name: str, bearing: Array) -> None:
     """Whirl speeds of the finite elements."""
     worst, spins = 0.0, RPM * np.array([20000.0, 60000.0])
     for spin in spins:
-        locus = model.locus("constants.spin", [spin])
+        locus = model.root_locus("constants.spin", [spin])
         known, found = whole(spin, bearing), np.sort(2 * np.pi * locus.frequency[0])
         worst = max(worst, float(np.abs(found[:10] / known[:10] - 1).max()))
     print(f"{name} bearings: ten whirl speeds as of finite elements to {worst:.1e}")

@@ -64,8 +64,16 @@ def main() -> None:
     """All four statements."""
     model = mstmm.compile(mstmm.load_scene(SCENE))
     loops = model.loops
-    print(f"cut: {', '.join(loops.cut)}; {loops.rank} of {len(loops.rows)} rows count")
-    assert (len(loops.cut), len(loops.rows), loops.rank, loops.mobility) == (5, 15, 15, 0)
+    print(
+        f"cut: {', '.join(loops.cut_hinges)}; {loops.rank} of {len(loops.constraint_rows)} rows "
+        f"count"
+    )
+    assert (len(loops.cut_hinges), len(loops.constraint_rows), loops.rank, loops.mobility) == (
+        5,
+        15,
+        15,
+        0,
+    )
 
     times = np.linspace(0.0, 2.0, 201)
     result = model.simulate(2.0, rtol=1e-8, output_times=times)

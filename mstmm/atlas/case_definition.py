@@ -32,7 +32,7 @@ class CaseDefinition:
 
     name: str
     title: str
-    why: str
+    cause: str
     parameter: str
     unit: str
     low: float

@@ -33,14 +33,14 @@ def measure_case(case: CaseDefinition, points: int, tolerance: float) -> Measure
     method = MeasuredMethod(case.method.measure, case.limit)
     remedy = MeasuredMethod(case.remedy.measure, case.limit)
     values = case.scale.grid(case.low, case.high, points)
-    holds_at_low = method.holds(case.low)
+    holds_at_low = method.is_within_limit(case.low)
     if not holds_at_low:
         values = values[::-1]
     try:
         bracket = find_frontier(method, values, case.scale, tolerance)
         assert bracket.fails_at is not None
         for value in values:
-            remedy.holds(value)  # adds a point to the plot
+            remedy.is_within_limit(value)  # adds a point to the plot
         remedy_values = case.scale.grid(bracket.fails_at, case.reach, points)
         remedy_bracket = find_end(remedy, remedy_values, case.scale, tolerance)
     except NumericalFailure as error:
@@ -48,7 +48,7 @@ def measure_case(case: CaseDefinition, points: int, tolerance: float) -> Measure
     return MeasuredCase(
         case.name,
         case.title,
-        case.why,
+        case.cause,
         case.parameter,
         case.unit,
         case.scale.name,

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
+from ..plain_data import stored_as, stored_keys
 from .frontier import Points
 
 
@@ -12,23 +13,23 @@ from .frontier import Points
 class CaseResult:
     """Result of a case: where a method fails, and how far its remedy holds.
 
-    `fails_at` and `holds_at` are the two ends of the last bracket, in `unit`; `fails` is the side
-    on which the method fails ("above" or "below").  `remedy_holds_to` is the end of the range that
-    was measured, or, where `remedy_fails_at` is a number, the end of the range of the remedy.
+    `fails_at` and `holds_at` are the two ends of the last bracket, in `unit`; `failing_side` is the
+    side on which the method fails ("above" or "below").  `remedy_holds_to` is the end of the range
+    that was measured, or, where `remedy_fails_at` is a number, the end of the range of the remedy.
     `points` and `remedy_points` are the measured points: pairs of the parameter and the error
     measure, infinite where there was no answer.
     """
 
     name: str
     title: str
-    why: str
+    explanation: str = field(metadata=stored_as("why"))
     parameter: str
     unit: str
     scale: str
     measured: str
     limit: float
     method: str
-    fails: str
+    failing_side: str = field(metadata=stored_as("fails"))
     fails_at: float
     holds_at: float
     monotone: bool
@@ -42,10 +43,12 @@ class CaseResult:
 
     def to_dict(self) -> dict[str, Any]:
         """Convert to plain data; pairs become lists, infinite values None."""
-        return {key: _to_plain(value) for key, value in vars(self).items()}
+        return {
+            key: _finite_pairs(getattr(self, name)) for name, key in stored_keys(CaseResult).items()
+        }
 
 
-def _to_plain(value: Any) -> Any:
+def _finite_pairs(value: Any) -> Any:
     if not isinstance(value, tuple):
         return value
     return [

@@ -14,13 +14,14 @@ from ..errors import NumericalFailure
 from ..pipeline.extended_precision import extended_precision_accelerations, relative_error
 from ..runtime.flexible.beam.dynamic_stiffness import Direction
 from ..runtime.flexible.beam.shape_functions import wave_number
+from ..runtime.integrate.methods import Method
 from ..runtime.model.model import Model
 from ..runtime.result.result import Result
 from .shared_scenes import (
     RELEASE_ANGLE,
+    rod_with_spring,
     solid_bar,
     spinning_top,
-    sprung_rod,
     stiffness_for_frequency,
 )
 
@@ -69,10 +70,10 @@ def rounding_error(model: Model, states: Iterable[tuple[Array, Array]]) -> float
     return max(relative_error(model.accelerations(q, u), exact(q, u)) for q, u in states)
 
 
-def relative_growth(model: Model, step: float, steps: int, method: str, **options: Any) -> float:
+def relative_growth(model: Model, step: float, steps: int, method: str | Method) -> float:
     """Largest coordinate over `steps` fixed steps (s), relative to the largest at the start."""
     times = np.arange(steps + 1) * step
-    run = simulate_to_end(model, times[-1], method, step, output_times=times, **options)
+    run = simulate_to_end(model, times[-1], method, step, output_times=times)
     return float(np.abs(run.q).max() / np.abs(run.q[0]).max())
 
 
@@ -82,7 +83,7 @@ def energy_gain(run: Result, exchanged: float) -> float:
     return 1 + float((energy - energy[0]).max()) / exchanged
 
 
-def relative_amplitudes(rate: float, steps: int, method: str, **options: Any) -> Array:
+def relative_amplitudes(rate: float, steps: int, method: str) -> Array:
     """Amplitude of a sprung rod's vibration after each step, relative to the start.
 
     It combines the angle and the speed over the frequency.  `rate` is the step times the angular
@@ -90,10 +91,8 @@ def relative_amplitudes(rate: float, steps: int, method: str, **options: Any) ->
     """
     frequency = rate / STEP
     times = np.arange(steps + 1) * STEP
-    rod = sprung_rod(stiffness_for_frequency(frequency))
-    run = simulate_to_end(
-        rod, times[-1], method, STEP, rtol=1e-10, atol=1e-14, output_times=times, **options
-    )
+    rod = rod_with_spring(stiffness_for_frequency(frequency))
+    run = simulate_to_end(rod, times[-1], method, STEP, rtol=1e-10, atol=1e-14, output_times=times)
     return np.hypot(run.q[:, 0], run.u[:, 0] / frequency) / RELEASE_ANGLE
 
 

@@ -34,7 +34,7 @@ class MeasuredMethod:
         self._measure, self._limit = measure, limit
         self._measured_values: dict[float, float] = {}
 
-    def holds(self, value: float) -> bool:
+    def is_within_limit(self, value: float) -> bool:
         """Whether the measured value is within the limit; no answer counts as a failure."""
         if value not in self._measured_values:
             try:
@@ -56,7 +56,7 @@ def find_frontier(
 
     Raises NumericalFailure otherwise.
     """
-    outcomes = [method.holds(value) for value in values]
+    outcomes = [method.is_within_limit(value) for value in values]
     if not outcomes[0] or outcomes[-1]:
         outcome = "holds" if outcomes[0] else "fails"
         raise NumericalFailure(
@@ -73,7 +73,7 @@ def find_end(
 
     Raises NumericalFailure otherwise.
     """
-    outcomes = [method.holds(value) for value in values]
+    outcomes = [method.is_within_limit(value) for value in values]
     if not outcomes[0]:
         raise NumericalFailure(f"the remedy fails where the method does, at {values[0]:g}")
     if all(outcomes):
@@ -93,7 +93,7 @@ def _bisect_first_change(
     first_failure = outcomes.index(False)
     holding_value, failing_value = values[first_failure - 1], values[first_failure]
     while (midpoint := scale.middle(holding_value, failing_value, tolerance)) is not None:
-        if method.holds(midpoint):
+        if method.is_within_limit(midpoint):
             holding_value = midpoint
         else:
             failing_value = midpoint

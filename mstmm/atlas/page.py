@@ -57,7 +57,7 @@ def parameter_with_unit(case: CaseResult) -> str:
 
 def frontier_text(case: CaseResult) -> str:
     """Name of the method, and where it starts to fail."""
-    direction = "up" if case.fails == "above" else "down"
+    direction = "up" if case.failing_side == "above" else "down"
     return f"{case.method}, from {format_number(case.fails_at)} {direction}"
 
 
@@ -69,7 +69,7 @@ def limit_text(case: CaseResult) -> str:
 def tested_range(case: CaseResult) -> float:
     """End of the range measured for the method, on the side on which it fails."""
     parameters = [parameter for parameter, _ in case.points]
-    return max(parameters) if case.fails == "above" else min(parameters)
+    return max(parameters) if case.failing_side == "above" else min(parameters)
 
 
 def remedy_range(case: CaseResult) -> str:
@@ -78,7 +78,7 @@ def remedy_range(case: CaseResult) -> str:
 
 
 def _section(case: CaseResult, pictures: bool) -> str:
-    lines = [f"## {case.name}", "", f"*{case.title}.* {case.why}", ""]
+    lines = [f"## {case.name}", "", f"*{case.title}.* {case.explanation}", ""]
     if pictures:
         lines += [f"![{case.title}]({case.name}.png)", ""]
     lines += [_result_list(case), "", f"Source: {case.source}.", ""]

@@ -69,7 +69,7 @@ def _draw_axis(axis: Any, case: CaseResult) -> None:
     _set_value_axis(axis, all_points, case.limit)
     axis.axvspan(
         case.fails_at,
-        right if case.fails == "above" else left,
+        right if case.failing_side == "above" else left,
         color=_FAILURE_SIDE_COLOUR,
         zorder=0,
     )
@@ -134,7 +134,7 @@ def _label_frontier(axis: Any, value: float) -> None:
 
 def _label_end(axis: Any, case: CaseResult) -> None:
     """Label the end of the measured range, above the last mark, or below a falling curve."""
-    previous_point, last_point = sorted(case.points, reverse=case.fails == "below")[-2:]
+    previous_point, last_point = sorted(case.points, reverse=case.failing_side == "below")[-2:]
     parameter, measured = last_point
     is_off_scale = _is_off_scale(measured)
     is_falling = not is_off_scale and measured < previous_point[1]

@@ -70,7 +70,7 @@ def random_pin_states(count: int) -> list[tuple[Array, Array]]:
     return [(rng.uniform(-1, 1, count), rng.uniform(-1, 1, count)) for _ in range(3)]
 
 
-def sprung_rod(stiffness: float, damping: float = 0.0) -> Model:
+def rod_with_spring(stiffness: float, damping: float = 0.0) -> Model:
     """Rod on a pin with spring and damper (N*m/rad, N*m*s/rad), from 1e-3 rad; no weight."""
     hinge = {
         "name": "pin", "type": "pin", "inboard": "ground", "outboard": "rod",
@@ -98,7 +98,7 @@ def hanging_rod(rate: float) -> Model:
 
 def stiffness_for_frequency(rate: float) -> float:
     """Stiffness, N*m/rad, with which a sprung rod has the angular frequency `rate` (1/s)."""
-    return rate**2 * float(sprung_rod(1.0).mass_matrix([0.0])[0, 0])
+    return rate**2 * float(rod_with_spring(1.0).mass_matrix([0.0])[0, 0])
 
 
 def double_pendulum(stiffness: float | None = None, stretch: float = 0.0) -> Model:
@@ -121,7 +121,7 @@ def double_pendulum(stiffness: float | None = None, stretch: float = 0.0) -> Mod
     return compile_looped({"gravity": [0, -9.81, 0], "body": bodies, "hinge": hinges})
 
 
-def sprung_elbow(stiffness: float, damping: float = 0.0) -> Model:
+def elbow_with_spring(stiffness: float, damping: float = 0.0) -> Model:
     """Two rods that fall from the horizontal, with a spring and a damper in their elbow.
 
     Units are N*m/rad and N*m*s/rad; the spring is unloaded at the start, with straight rods.

@@ -104,7 +104,7 @@ def _check_function(what: str) -> Callable[[str], Report]:
 def _check_scene(path: str) -> Report:
     """Validate, compile, and evaluate the accelerations once."""
     import mstmm
-    from mstmm.runtime.packing.merging.simplification import COUNTED
+    from mstmm.runtime.packing.merging.simplification import COUNT_TEXTS
     from mstmm.runtime.run.step_stability import find_fastest_motion
 
     from .model_loading import compile_file
@@ -117,9 +117,14 @@ def _check_scene(path: str) -> Report:
         "springs": len(scene.spring), "bushings": len(scene.bushing), "loads": len(scene.load),
         "events": len(scene.event),
     }  # fmt: skip
-    notes = [f"{name}: {note}" for name, body in model.flexible.items() for note in body.notes]
-    notes += [str(one) for one in model.simplifications if one.kind in COUNTED]
-    warnings = [*scene.warnings, *(w for body in model.flexible.values() for w in body.warnings)]
+    notes = [
+        f"{name}: {note}" for name, body in model.flexible_bodies.items() for note in body.notes
+    ]
+    notes += [str(one) for one in model.simplifications if one.kind in COUNT_TEXTS]
+    warnings = [
+        *scene.warnings,
+        *(w for body in model.flexible_bodies.values() for w in body.warnings),
+    ]
     is_examined = model.nu <= _MAX_EXAMINED_SPEEDS
     fastest = find_fastest_motion(model.looped, *model.initial_state()) if is_examined else None
     report = {
@@ -197,7 +202,7 @@ def _tree_lines(scene: Scene) -> list[str]:
         if len(lines) > _MAX_SHOWN:
             break
         first = 1 + _tree_depth(tree, depth, run.parent)
-        depth[run.place] = first
+        depth[run.position] = first
         hinge, body = skeleton.hinges[run.hinge], skeleton.bodies[run.body]
         description = f"{body.name}  ({hinge.name}: {hinge.type})"
         if run.count > 1:
@@ -207,53 +212,59 @@ def _tree_lines(scene: Scene) -> list[str]:
         shown_count += run.count
     if shown_count < tree.count:
         lines.append(f"  ... and {tree.count - shown_count} more bodies")
-    for number in tree.cut[:_MAX_SHOWN]:
+    for number in tree.cut_hinges[:_MAX_SHOWN]:
         cut = skeleton.hinges[number]
         lines.append(f"  {cut.name}: {cut.type} closes a loop: {cut.inboard} - {cut.outboard}")
-    if len(tree.cut) > _MAX_SHOWN:
-        lines.append(f"  ... and {len(tree.cut) - _MAX_SHOWN} more loops")
+    if len(tree.cut_hinges) > _MAX_SHOWN:
+        lines.append(f"  ... and {len(tree.cut_hinges) - _MAX_SHOWN} more loops")
     return lines
 
 
 def _loop_data(loops: LoopAnalysis) -> Report | None:
     """Data of `model.loops`, for JSON; None without closed loops."""
-    if not loops.rows:
+    if not loops.constraint_rows:
         return None
-    gap, name, direction = loops.misfit
+    gap, name, direction = loops.redundancy_gap
     return {
-        "rows": len(loops.rows), "rank": loops.rank, "mobility": loops.mobility,
-        "shapes": loops.shapes, "cut": list(loops.cut),
+        "rows": len(loops.constraint_rows), "rank": loops.rank, "mobility": loops.mobility,
+        "shapes": loops.flexible_mobility, "cut": list(loops.cut_hinges),
         "dropped": [
-            {"of": owner, "direction": word, "momentary": (owner, word) in loops.momentary}
-            for owner, word in loops.redundant
+            {
+                "of": owner,
+                "direction": word,
+                "momentary": (owner, word) in loops.redundant_in_this_pose,
+            }
+            for owner, word in loops.redundant_rows
         ],
-        "singular": loops.singular, "nearby": loops.nearby,
+        "singular": loops.singular, "nearby": loops.generic_rank,
         "misfit": {"gap": gap, "of": name, "direction": direction} if name else None,
-        "reactions_unique": not loops.not_unique,
-        "not_unique": {owner: list(words) for owner, words in loops.not_unique.items()},
+        "reactions_unique": not loops.indeterminate_reactions,
+        "not_unique": {
+            owner: list(words) for owner, words in loops.indeterminate_reactions.items()
+        },
     }  # fmt: skip
 
 
 def _loop_lines(loops: LoopAnalysis) -> list[str]:
     """Lines about closed loops: rank, mobility, redundant rows, indeterminate loads."""
-    if not loops.rows:
+    if not loops.constraint_rows:
         return []
-    lines = [f"  loops: {loops.counted}"]
-    if loops.redundant:
-        lines.append(f"  loops: redundant rows: {loops.repeated(_MAX_SHOWN)}")
+    lines = [f"  loops: {loops.summary}"]
+    if loops.redundant_rows:
+        lines.append(f"  loops: redundant rows: {loops.redundant_text(_MAX_SHOWN)}")
     if loops.singular:
         lines.append(
             f"  loops: the start is a singular configuration: {loops.rank} independent rows "
-            f"there, {loops.nearby} nearby"
+            f"there, {loops.generic_rank} nearby"
         )
-    if loops.misfit[0]:
-        gap, name, word = loops.misfit
+    if loops.redundancy_gap[0]:
+        gap, name, word = loops.redundancy_gap
         lines.append(
             f"  loops: {word} of {name} is redundant, violated by {gap:.1e} (m, rad): "
             "correct axes or lengths"
         )
-    if loops.not_unique:
-        lines.append(f"  loops: indeterminate loads of rigid bodies: {loops.open_loads}")
+    if loops.indeterminate_reactions:
+        lines.append(f"  loops: indeterminate loads of rigid bodies: {loops.indeterminate_text}")
     return lines
 
 

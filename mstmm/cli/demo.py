@@ -119,6 +119,7 @@ def _simulate(text: str) -> tuple[Result, float]:
     import tomllib
 
     import mstmm
+    from mstmm.runtime.model.execution import Execution
     from mstmm.runtime.model.run_results import certify_result
 
     model = mstmm.compile(mstmm.Scene(**tomllib.loads(text)))
@@ -126,7 +127,7 @@ def _simulate(text: str) -> tuple[Result, float]:
     times = [T_END * i / (SAMPLES - 1) for i in range(SAMPLES)]
     with progress_bar() as progress:
         start_time = time.perf_counter()
-        result = model.simulate(T_END, output_times=times, progress=progress)
+        result = model.simulate(T_END, output_times=times, execution=Execution(progress=progress))
         seconds = time.perf_counter() - start_time
         progress.label("estimating the error")
         result = certify_result(result, progress)

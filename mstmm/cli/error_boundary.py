@@ -37,7 +37,7 @@ def run_and_exit(arguments: Sequence[str]) -> NoReturn:
 
 
 def run(arguments: Sequence[str]) -> int:
-    """Run one command; every exception becomes a message on stderr and an exit code."""
+    """Run one command; return its exit code, with exceptions as messages on stderr or JSON."""
     try:
         code = _run_command(list(arguments))
         if (

@@ -7,7 +7,7 @@ from pathlib import Path
 from mstmm import optional_packages
 from mstmm.errors import EnvironmentFailure
 
-_EXTRA_OF = {
+_EXTRA_BY_SUFFIX = {
     ".nc": "io", ".png": "plot", ".svg": "plot", ".pdf": "plot", ".gif": "plot", ".mp4": "plot",
     ".html": "view",
 }  # fmt: skip
@@ -25,7 +25,7 @@ def install_command(extra: str) -> str:
 
 def require_extra_for(path: Path, option: str) -> None:
     """Raise EnvironmentFailure if writing this file needs a package that is not installed."""
-    extra = _EXTRA_OF.get(path.suffix.lower())
+    extra = _EXTRA_BY_SUFFIX.get(path.suffix.lower())
     if extra is not None and missing_packages(extra):
         alternative = "; or use a name ending in .csv" if extra == "io" else ""
         raise EnvironmentFailure(

@@ -68,11 +68,12 @@ def _generate_user_elements(files: list[str], json: bool) -> None:
         seconds = time.perf_counter() - begin
         for element in elements:
             spec = element.spec
-            entry = {"file": file, "kind": spec.kind, "name": spec.name, "how": element.how}
+            entry = {"file": file, "kind": spec.kind, "name": spec.name, "how": element.execution}
             generated.append({**entry, "folder": str(element.folder), "seconds": seconds})
             if not json:
                 print_lines(
-                    f"{spec.kind} {spec.name}: {element.how}; in {element.folder} ({seconds:.1f} s)"
+                    f"{spec.kind} {spec.name}: {element.execution}; in {element.folder} "
+                    f"({seconds:.1f} s)"
                 )
     if json:
         print_json({"generated": generated})

@@ -45,8 +45,7 @@ def import_robot(
         ),
     ] = "fixed",
     keep_fixed: Annotated[
-        bool,
-        typer.Option("--keep-fixed", help="Keep links on fixed joints as separate bodies."),
+        bool, typer.Option("--keep-fixed", help="Keep links on fixed joints as separate bodies.")
     ] = False,
     stops: Annotated[
         float | None,

@@ -21,6 +21,18 @@ if TYPE_CHECKING:
 #: Largest number of samples of a run.
 MAX_SAMPLES = 10_000_000
 
+
+def option(
+    name: str,
+    metavar: str,
+    description: str,
+    parser: Callable[[Any], Any] | None = None,
+    **more: Any,
+) -> Any:
+    """Option such as "--step" or "--input/-i", with its value's name and its help text."""
+    return typer.Option(*name.split("/"), metavar=metavar, help=description, parser=parser, **more)
+
+
 json_option = typer.Option("--json", help="Print JSON instead of text.")
 Json = Annotated[bool, json_option]
 

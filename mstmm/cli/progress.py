@@ -17,8 +17,8 @@ class ProgressBar:
     """Progress bar of a run, shown after `DISPLAY_DELAY`; call it with (t, t_end) of the run, s."""
 
     def __init__(self, shown: bool, label: str = "simulating", moves_alone: bool = True) -> None:
-        self._shown, self._begin = shown, time.monotonic()
-        self._moves_alone = moves_alone
+        self._is_shown, self._begin = shown, time.monotonic()
+        self._auto_refresh = moves_alone
         self._bar: Any = None
         self._task: Any = None
         self._label = label
@@ -30,23 +30,25 @@ class ProgressBar:
             self._bar.reset(self._task, description=text)
 
     def __call__(self, t: float, t_end: float) -> None:
-        self.share(t / t_end if t_end > 0 else 1.0, f"t = {t:.4g} of {t_end:.4g} s")
+        self.show_fraction(t / t_end if t_end > 0 else 1.0, f"t = {t:.4g} of {t_end:.4g} s")
 
-    def share(self, part: float, state: str) -> None:
+    def show_fraction(self, part: float, state: str) -> None:
         """Show the finished part, 0 to 1, with a text.
 
         If the terminal is closed, the bar ends but the work continues.
         """
-        if not self._shown or (
+        if not self._is_shown or (
             self._bar is None and time.monotonic() - self._begin < DISPLAY_DELAY
         ):
             return
         try:
             if self._bar is None:
                 self._start()
-            self._bar.update(self._task, completed=part, state=state, refresh=not self._moves_alone)
+            self._bar.update(
+                self._task, completed=part, state=state, refresh=not self._auto_refresh
+            )
         except OSError:
-            self._shown = False
+            self._is_shown = False
 
     def _start(self) -> None:
         from rich.console import Console
@@ -56,7 +58,7 @@ class ProgressBar:
             TextColumn("{task.description}"), BarColumn(),
             TextColumn("{task.percentage:>3.0f} %  {task.fields[state]}  left"),
             TimeRemainingColumn(compact=True),
-            console=Console(stderr=True), transient=True, auto_refresh=self._moves_alone,
+            console=Console(stderr=True), transient=True, auto_refresh=self._auto_refresh,
         )  # fmt: skip
         self._bar.start()
         self._task = self._bar.add_task(self._label, total=1.0, state="")

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import textwrap
-from dataclasses import asdict, fields, is_dataclass
 from typing import TYPE_CHECKING, Any
 
+from mstmm.plain_data import stored_keys, to_plain
 from mstmm.risk import to_rows
 
 if TYPE_CHECKING:
@@ -20,10 +20,10 @@ def size_text(result: Result) -> str:
     """Size of the scene: "3 bodies on 3 hinges, 7 degrees of freedom, 2 driven"."""
 
     model, bodies = result.model, len(result.model.scene.skeleton.bodies)
-    free_count, driven_count = len(model.free_speeds), len(model.packed.system.driven)
+    free_count, driven_count = len(model.free_speed_indices), len(model.packed_scene.system.driven)
     locked_count = model.nu - free_count - driven_count
-    if model.closed is not None:  # loops reduce the mobility of all speeds together
-        free_count, locked_count = model.closed.loops.mobility, 0
+    if model.loop_start is not None:  # loops reduce the mobility of all speeds together
+        free_count, locked_count = model.loop_start.loops.mobility, 0
     parts = [
         f"{count_text(bodies, 'body', 'bodies')} on {count_text(len(model.scene.hinges), 'hinge')}",
         f"{count_text(free_count, 'degree')} of freedom",
@@ -35,12 +35,12 @@ def size_text(result: Result) -> str:
 
 def simplification_counts(result: Result) -> str:
     """Numbers of simplifications of the scene; empty if there are none."""
-    from mstmm.runtime.packing.merging.simplification import COUNTED
+    from mstmm.runtime.packing.merging.simplification import COUNT_TEXTS
 
     kinds = [singular.kind for singular in result.model.simplifications]
     return "; ".join(
         f"{count_text(kinds.count(kind), singular, plural)} {description}"
-        for kind, (singular, plural, description) in COUNTED.items() if kind in kinds
+        for kind, (singular, plural, description) in COUNT_TEXTS.items() if kind in kinds
     )  # fmt: skip
 
 
@@ -72,7 +72,7 @@ def effort_text(result: Result, seconds: float) -> str:
 
 def method_lines(result: Result, width: int) -> list[str]:
     """Lines with the methods of a run; for many time spans, the total time of each method."""
-    spans = result.methods
+    spans = result.method_history
     if not spans:
         return []
     if len(spans) <= _MAX_LISTED_SPANS:
@@ -89,7 +89,7 @@ def fitting_table(result: Result, names: tuple[str, ...], rows: int, width: int)
     """Table of some samples; on a narrow terminal default columns are left out."""
     from mstmm.runtime.result.export.text_table import default_names
 
-    pictures = result.pictures()
+    pictures = result.picture_names()
     numeric_names = [name for name in names if name not in pictures]
     if numeric_names:
         return result.table(*numeric_names, rows=rows)
@@ -103,9 +103,9 @@ def fitting_table(result: Result, names: tuple[str, ...], rows: int, width: int)
 
 def to_json(result: Result, seconds: float, verdict: Verdict) -> dict[str, Any]:
     """Result of a run as plain data, without its samples, which are in the file."""
-    layout = result.model.layout
+    layout = result.model.coordinate_layout
     last_index = len(result.t) - 1
-    statistics, estimate = result.statistics, result.error_estimate
+    statistics, estimate = result.statistics, result.achieved_error
     outputs = result.outputs() if last_index >= 0 else {}
     return {
         "success": result.success,
@@ -123,13 +123,13 @@ def to_json(result: Result, seconds: float, verdict: Verdict) -> dict[str, Any]:
         else {},
         "outputs": {name: values[last_index].tolist() for name, values in outputs.items()},
         "method": result.settings.method,
-        "methods": [asdict(stretch) for stretch in result.methods],
-        "simplifications": [asdict(one) for one in result.model.simplifications],
+        "methods": to_plain(result.method_history),
+        "simplifications": to_plain(result.model.simplifications),
         "engine": result.model.engine,
-        "engine_choice": result.model.engine_choice,
+        "engine_choice": result.model.engine_reason,
         "sweep": result.model.sweep,
         "seconds": seconds,
-        "statistics": None if statistics is None else asdict(statistics),
+        "statistics": to_plain(statistics),
         "error_estimate": None if estimate is None else estimate.to_dict(),
         "risks": to_rows(result.risks),
         "warnings": list(result.warnings),
@@ -140,23 +140,22 @@ def to_json(result: Result, seconds: float, verdict: Verdict) -> dict[str, Any]:
 def _certificate_data(result: Result) -> dict[str, Any]:
     """Certificate as plain data; the estimated error by unit."""
     certificate = result.certificate
-    excluded = ("error", "reached", "models", "known", "control")  # in other rows
-    data = {
-        f.name: getattr(certificate, f.name) for f in fields(certificate) if f.name not in excluded
+    excluded = ("error", "reached", "models", "known", "control")  # reported elsewhere
+    plain = {
+        key: to_plain(getattr(certificate, name))
+        for name, key in stored_keys(certificate).items()
+        if key not in excluded
     }
-    plain = {key: vars(v) if is_dataclass(v) else v for key, v in data.items()}
     plain["risks"] = to_rows(certificate.risks)
-    plain["momentum"] = [vars(drift) for drift in certificate.momentum]
-    plain["flexible"] = [vars(body) for body in certificate.flexible]
     error = certificate.error
     if error is None:
         return {**plain, "error": None}
     return {
         **plain,
         "error": {
-            "q": error.largest("q"), "u": error.largest("u"), "until": error.horizon,
+            "q": error.largest("q"), "u": error.largest("u"), "until": error.divergence_time,
             "covered": error.covered,
-            "tenfold_every": error.tenfold, "reference": error.reference,
+            "tenfold_every": error.tenfold_time, "reference": error.reference,
         },
     }  # fmt: skip
 
@@ -170,7 +169,7 @@ def verdict_lines(verdict: Verdict, width: int, told: bool = True) -> list[str]:
 def certificate_lines(result: Result, width: int) -> list[str]:
     """Certificate and all warnings of a result, wrapped to the width of the terminal."""
     certificate = result.certificate
-    text = certificate.text(verdict=False, warnings=result.trajectory.told)
+    text = certificate.as_text(verdict=False, warnings=result.trajectory.reported_risks)
     lines = text.replace("certify=True", "--certify").splitlines()
     other_warnings = [w for w in result.warnings if w not in certificate.warnings]
     lines += [f"note: {warning}" for warning in other_warnings]

@@ -73,7 +73,7 @@ def motion_at(
     """
     resolved = InputNodes(Graph().element("t"), inputs or {})
     nodes = motion(drive, resolved.time, resolved.node)
-    q, u, a = (node_value(node, resolved.leaf(t)) for node in nodes)
+    q, u, a = (node_value(node, resolved.input_value(t)) for node in nodes)
     return q, u, a
 
 
@@ -93,7 +93,7 @@ def jump_message(
     nodes = motion(drive, resolved.time, resolved.node)[:2]
     for gap in gaps:
         for quantity, node in zip(("position", "speed"), nodes, strict=True):
-            a, b = (node_value(node, resolved.leaf(t)) for t in gap)
+            a, b = (node_value(node, resolved.input_value(t)) for t in gap)
             if abs(b - a) > _MAX_RELATIVE_JUMP * max(1.0, abs(a), abs(b)):
                 return (
                     f"jumps in {quantity} at t = {gap[0]:g} s, from {a:g} to {b:g}; "

@@ -85,7 +85,7 @@ class Expression:
 
     def _part(self, root: int) -> Expression:
         term = self.terms[root]
-        required = self._needed(root)
+        required = self._dependencies(root)
         names = _distinct(t.name for i, t in enumerate(self.terms) if i in required and t.name)
         # `text` was stripped before parsing, so that positions point into it.
         return Expression(
@@ -93,11 +93,11 @@ class Expression:
         )
 
     @property
-    def needed(self) -> frozenset[int]:
+    def required_terms(self) -> frozenset[int]:
         """Indices of the terms that the value depends on."""
-        return frozenset(self._needed(self.root))
+        return frozenset(self._dependencies(self.root))
 
-    def _needed(self, root: int) -> set[int]:
+    def _dependencies(self, root: int) -> set[int]:
         required: set[int] = set()
         stack = [root]
         while stack:
@@ -120,7 +120,7 @@ class Expression:
         """Build the nodes of all terms that the value depends on, by term index."""
         nodes: dict[int, Node] = {}
         never_nan: set[int] = set()  # terms that are never nan while names are finite
-        for number in sorted(self._needed(self.root)):
+        for number in sorted(self._dependencies(self.root)):
             term = self.terms[number]
             args = [nodes[i] for i in term.args]
             is_total = term.op in _NEVER_NAN and never_nan.issuperset(term.args)
@@ -134,7 +134,7 @@ class Expression:
     def evaluate(self, values: Callable[[Name], float]) -> float:
         """Evaluate in double precision; nan or infinity where there is no finite value."""
         term_values: dict[int, float] = {}
-        required = self._needed(self.root)
+        required = self._dependencies(self.root)
         for number, term in enumerate(self.terms):
             if number not in required:
                 continue
@@ -162,7 +162,7 @@ class Expression:
         None for a term that never switches.
         """
         linear_functions: list[_LinearFunction | None] = []
-        required = self._needed(self.root)
+        required = self._dependencies(self.root)
         times_by_term: dict[int, float | None] = {}
         for number, term in enumerate(self.terms):
             args = [linear_functions[i] for i in term.args]
@@ -210,7 +210,7 @@ def _parse(text: str, constants: tuple[tuple[str, float], ...] = ()) -> Expressi
     parser = Parser(text, dict(constants))
     root = parser.run()
     names = _distinct(term.name for term in parser.terms if term.name is not None)
-    used_constants = tuple(parser.used.items())
+    used_constants = tuple(parser.used_constants.items())
     return Expression(text, names, tuple(parser.terms), root, constants=used_constants)
 
 

@@ -40,26 +40,26 @@ class InputNodes:
     def __init__(self, time: Node, inputs: Inputs) -> None:
         self.time, self.inputs = time, inputs
         self._leaves: dict[int, tuple[str, int]] = {}
-        self._places = {name: index for index, name in enumerate(inputs)}
+        self._indices = {name: index for index, name in enumerate(inputs)}
 
     def node(self, name: Name) -> Node:
         """Build the node of `t` or of an input."""
         if name.text == "t":
             return self.time
-        first_index = NUMBERS_PER_PIECE * self._places[name.text]
+        first_index = NUMBERS_PER_PIECE * self._indices[name.text]
         numbers = [
             self.time.graph.element(INPUTS, first_index + k) for k in range(NUMBERS_PER_PIECE)
         ]
         self._leaves.update({node.number: (name.text, k) for k, node in enumerate(numbers)})
         return polynomial(numbers, self.time)
 
-    def leaf(self, t: float) -> Callable[[Node], float]:
+    def input_value(self, t: float) -> Callable[[Node], float]:
         """Function that returns the value of each leaf at time t (s)."""
 
         def number(node: Node) -> float:
             if node.number not in self._leaves:
                 return t
             name, k = self._leaves[node.number]
-            return self.inputs[name].at(t)[k]
+            return self.inputs[name].piece_at(t)[k]
 
         return number

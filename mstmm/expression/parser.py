@@ -187,16 +187,16 @@ class _PendingOperator:
 class Parser:
     """Parser of one expression; `run` fills `terms` and returns the index of the root.
 
-    `constants` maps names to numbers; `used` are the constants that the text contains.
+    `constants` maps names to numbers; `used_constants` are the constants that the text contains.
     """
 
     def __init__(self, text: str, constants: Mapping[str, float] | None = None) -> None:
         self.text = text
-        self.used: dict[str, float] = {}
+        self.used_constants: dict[str, float] = {}
         self._constants = {} if constants is None else constants
         self.terms: list[Term] = []
         self._operands: list[tuple[int, int, int]] = []  # term, start and end with parentheses
-        self._waiting: list[_PendingOperator] = []
+        self._pending_operators: list[_PendingOperator] = []
         self._depth = 0
 
     def error(self, message: str, position: int) -> ExpressionError:
@@ -224,8 +224,8 @@ class Parser:
         if expects_operand:
             raise self.error("the expression ends where a value is expected", len(self.text))
         self._reduce_to_group()
-        if self._waiting:
-            open_position = self._waiting[-1].position
+        if self._pending_operators:
+            open_position = self._pending_operators[-1].position
             raise self.error("this parenthesis is not closed; add )", open_position)
         return self._operands[-1][0]
 
@@ -244,8 +244,8 @@ class Parser:
         if token == "(":
             self._open("(", start)
         elif token == "-":
-            self._waiting.append(_PendingOperator("neg", _PREFIX_PRECEDENCE, start))
-        elif token == ")" and self._waiting and self._waiting[-1].is_group:
+            self._pending_operators.append(_PendingOperator("neg", _PREFIX_PRECEDENCE, start))
+        elif token == ")" and self._pending_operators and self._pending_operators[-1].is_group:
             raise self.error("a value is missing before )", start)
         elif token == "*" and self.text[max(0, start - 1) : start] == "*":
             raise self.error(_REMEDIES["**"], start - 1)
@@ -274,7 +274,7 @@ class Parser:
             self._operands[-1] = (len(self.terms) - 1, start, end)
             return False, end
         if token in self._constants:
-            value = self.used[token] = float(self._constants[token])
+            value = self.used_constants[token] = float(self._constants[token])
             exact = _limit_digits(Fraction(repr(value)), value)
             self._push(Term("number", (), start, end, exact, value), start, end)
             return False, end
@@ -305,14 +305,14 @@ class Parser:
             self._comma(start)
             return True
         op, precedence = _OPERATORS.get(token) or (COMPARISONS[token], 1)
-        while self._waiting and not self._waiting[-1].is_group:
-            top = self._waiting[-1].precedence
+        while self._pending_operators and not self._pending_operators[-1].is_group:
+            top = self._pending_operators[-1].precedence
             if precedence == 1 and top == 1:
                 raise self.error("comparisons cannot be chained; nest where(..) instead", start)
             if top < precedence or (top == precedence and token == "^"):
                 break
             self._reduce()
-        self._waiting.append(_PendingOperator(op, precedence, start))
+        self._pending_operators.append(_PendingOperator(op, precedence, start))
         return True
 
     # --- groups and functions ---------------------------------------------------------------
@@ -321,26 +321,25 @@ class Parser:
         self._depth += 1
         if self._depth > MAX_DEPTH:
             raise self.error(f"more than {MAX_DEPTH} nested parentheses", start)
-        self._waiting.append(_PendingOperator(op, 0, start, is_group=True))
+        self._pending_operators.append(_PendingOperator(op, 0, start, is_group=True))
 
     def _reduce_to_group(self) -> None:
-        while self._waiting and not self._waiting[-1].is_group:
+        while self._pending_operators and not self._pending_operators[-1].is_group:
             self._reduce()
 
     def _comma(self, start: int) -> None:
         self._reduce_to_group()
-        if not self._waiting or self._waiting[-1].op == "(":
+        if not self._pending_operators or self._pending_operators[-1].op == "(":
             raise self.error(
-                "a comma only separates arguments of a function; write decimals with a point",
-                start,
+                "a comma only separates arguments of a function; write decimals with a point", start
             )
-        self._waiting[-1].arguments += 1
+        self._pending_operators[-1].arguments += 1
 
     def _close(self, start: int) -> None:
         self._reduce_to_group()
-        if not self._waiting:
+        if not self._pending_operators:
             raise self.error("this parenthesis has no opening one; remove it, or add (", start)
-        group = self._waiting.pop()
+        group = self._pending_operators.pop()
         self._depth -= 1
         if group.op == "(":
             term, _, _ = self._operands.pop()
@@ -384,7 +383,7 @@ class Parser:
         return Term("number", (), start, end, _limit_digits(Fraction(token), value), value)
 
     def _reduce(self) -> None:
-        pending = self._waiting.pop()
+        pending = self._pending_operators.pop()
         count = 1 if pending.op == "neg" else 2
         members = self._operands[-count:]
         del self._operands[-count:]

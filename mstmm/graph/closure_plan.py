@@ -107,14 +107,14 @@ def plan_closures(mechanism: MechanismGraph, tree: Tree) -> ClosurePlan:
     """Plan the loop closures of a given tree."""
     cut_hinges = mechanism.cuts(tree)
     group_hinges = tuple(hinge for hinge in cut_hinges if mechanism.hinges[hinge].rows)
-    groups = (*(mechanism.groups[hinge] for hinge in group_hinges), *mechanism.others)
+    groups = (*(mechanism.groups[hinge] for hinge in group_hinges), *mechanism.constraint_groups)
     paths = Paths(mechanism, tree)
     pending: list[list[int]] = [[] for _ in range(mechanism.bodies)]
     groups_by_body: dict[int, list[int]] = {}
     for number, group in enumerate(groups):
-        for body, _ in paths.crossed(group):
+        for body, _ in paths.crossed_bodies(group):
             pending[body].append(number)
-        groups_by_body.setdefault(paths.closes_at(group.ends), []).append(number)
+        groups_by_body.setdefault(paths.closing_body(group.ends), []).append(number)
     closures = tuple(_order_closures(paths, groups, pending, groups_by_body))
     return ClosurePlan(
         mechanism, tree, cut_hinges, group_hinges, groups, tuple(map(tuple, pending)), closures

@@ -33,11 +33,11 @@ class _Search:
         self.holders, self.tree = mechanism.holders, list(tree)
         paths = Paths(mechanism, tree)
         self.parent = paths.parent
-        self.across: list[dict[int, int]] = [{} for _ in self.parent]
+        self.pending_end_counts: list[dict[int, int]] = [{} for _ in self.parent]
         self.rows = [0] * len(self.parent)
         for number in mechanism.closures(tree):
-            for body, ends in paths.crossed(self.groups[number]):
-                self._put(body, number, ends)
+            for body, ends in paths.crossed_bodies(self.groups[number]):
+                self._store_end_count(body, number, ends)
 
     def run(self) -> None:
         """Swap while the cost falls; bodies whose gain may have changed are queued again."""
@@ -47,45 +47,46 @@ class _Search:
             body = queue.popleft()
             queued.discard(body)
             best = min(
-                ((self._gain(body, hinge), hinge) for hinge in self.holders[body]), default=(0, 0)
+                ((self._cost_change(body, hinge), hinge) for hinge in self.holders[body]),
+                default=(0, 0),
             )
             if best[0] >= 0:
                 continue
-            for affected_body in self._touched(self._swap(body, best[1])):
+            for affected_body in self._affected_bodies(self._swap(body, best[1])):
                 if affected_body not in queued:
                     queued.add(affected_body)
                     queue.append(affected_body)
 
-    def _touched(self, bodies: list[int]) -> Iterator[int]:
+    def _affected_bodies(self, bodies: list[int]) -> Iterator[int]:
         """Outboard bodies of the cut hinges whose rows pass the hinges of these bodies."""
         for body in bodies:
-            for number in self.across[body]:
+            for number in self.pending_end_counts[body]:
                 if number < len(self.hinges):
                     yield self.hinges[number].outboard
 
-    def _put(self, body: int, group: int, ends: int) -> None:
+    def _store_end_count(self, body: int, group: int, ends: int) -> None:
         """Store how many ends of a group are outboard of a hinge; none or all means not pending."""
-        body_end_counts, row_group = self.across[body], self.groups[group]
+        body_end_counts, row_group = self.pending_end_counts[body], self.groups[group]
         if 0 < ends < len(row_group.ends):
             self.rows[body] += 0 if group in body_end_counts else row_group.count
             body_end_counts[group] = ends
         elif body_end_counts.pop(group, None) is not None:
             self.rows[body] -= row_group.count
 
-    def _way(self, body: int, group: int) -> list[int]:
+    def _pending_path(self, body: int, group: int) -> list[int]:
         """Bodies from `body` inwards across whose inboard hinges a group is pending."""
         path = []
-        while body != GROUND and group in self.across[body]:
+        while body != GROUND and group in self.pending_end_counts[body]:
             path.append(body)
             body = self.parent[body]
         return path
 
-    def _gain(self, body: int, hinge: int) -> int:
+    def _cost_change(self, body: int, hinge: int) -> int:
         """Change of the cost if `hinge` becomes the inboard hinge of the body.
 
         0 where that is impossible: a body cannot be outboard of itself.
         """
-        body_end_counts = self.across[body]
+        body_end_counts = self.pending_end_counts[body]
         if hinge not in body_end_counts:
             return 0
         old_hinge = self.tree[body]
@@ -93,13 +94,19 @@ class _Search:
         change = pending_cost(self.rows[body] + row_difference) - pending_cost(self.rows[body])
         moved_groups = [(g, n, len(self.groups[g].ends), self.groups[g].count)
                   for g, n in body_end_counts.items() if g != hinge]  # fmt: skip
-        for path_body in self._way(self.parent[body], hinge):
-            rows, path_end_counts = self.rows[path_body] + row_difference, self.across[path_body]
+        for path_body in self._pending_path(self.parent[body], hinge):
+            rows, path_end_counts = (
+                self.rows[path_body] + row_difference,
+                self.pending_end_counts[path_body],
+            )
             for g, n, end_total, count in moved_groups:
                 rows += count * ((path_end_counts.get(g, end_total) > n) - (g in path_end_counts))
             change += pending_cost(rows) - pending_cost(self.rows[path_body])
-        for path_body in self._way(self.hinges[hinge].inboard, hinge):
-            rows, path_end_counts = self.rows[path_body] + row_difference, self.across[path_body]
+        for path_body in self._pending_path(self.hinges[hinge].inboard, hinge):
+            rows, path_end_counts = (
+                self.rows[path_body] + row_difference,
+                self.pending_end_counts[path_body],
+            )
             for g, n, end_total, count in moved_groups:
                 rows += count * (
                     (path_end_counts.get(g, 0) + n < end_total) - (g in path_end_counts)
@@ -114,17 +121,26 @@ class _Search:
             self.parent[body],
             self.hinges[hinge].inboard,
         )
-        old_path, new_path = self._way(old_parent, hinge), self._way(new_parent, hinge)
-        moved_groups = [(g, n, len(self.groups[g].ends)) for g, n in self.across[body].items()
-                 if g != hinge]  # fmt: skip
+        old_path, new_path = (
+            self._pending_path(old_parent, hinge), self._pending_path(new_parent, hinge),
+        )  # fmt: skip
+        moved_groups = [
+            (g, n, len(self.groups[g].ends))
+            for g, n in self.pending_end_counts[body].items()
+            if g != hinge
+        ]
         for path, sign in ((old_path, -1), (new_path, 1)):
             for path_body in path:
-                self._put(path_body, hinge, 0)
+                self._store_end_count(path_body, hinge, 0)
                 for g, n, end_total in moved_groups:
                     absent_count = end_total if sign < 0 else 0
-                    self._put(path_body, g, self.across[path_body].get(g, absent_count) + sign * n)
-                self._put(path_body, old_hinge, 1)
-        self._put(body, hinge, 0)
-        self._put(body, old_hinge, 1)
+                    self._store_end_count(
+                        path_body,
+                        g,
+                        self.pending_end_counts[path_body].get(g, absent_count) + sign * n,
+                    )
+                self._store_end_count(path_body, old_hinge, 1)
+        self._store_end_count(body, hinge, 0)
+        self._store_end_count(body, old_hinge, 1)
         self.tree[body], self.parent[body] = hinge, new_parent
         return [body, *old_path, *new_path]

@@ -44,7 +44,7 @@ class MechanismGraph:
 
     bodies: int
     hinges: tuple[Edge, ...]
-    others: tuple[RowGroup, ...] = ()
+    constraint_groups: tuple[RowGroup, ...] = ()
 
     @cached_property
     def holders(self) -> tuple[tuple[int, ...], ...]:
@@ -65,7 +65,7 @@ class MechanismGraph:
     def groups(self) -> tuple[RowGroup, ...]:
         """Row groups: those of every hinge if it were cut, then the other rows."""
         closures = (RowGroup((edge.inboard, edge.outboard), edge.rows) for edge in self.hinges)
-        return (*closures, *self.others)
+        return (*closures, *self.constraint_groups)
 
     def cuts(self, tree: tuple[int, ...]) -> tuple[int, ...]:
         """Cut hinges: those that are not part of a tree."""
@@ -75,4 +75,4 @@ class MechanismGraph:
     def closures(self, tree: tuple[int, ...]) -> tuple[int, ...]:
         """Indices of the groups that close with a tree: its cut hinges, then the other rows."""
         first_other = len(self.hinges)
-        return (*self.cuts(tree), *range(first_other, first_other + len(self.others)))
+        return (*self.cuts(tree), *range(first_other, first_other + len(self.constraint_groups)))

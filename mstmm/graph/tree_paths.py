@@ -59,7 +59,7 @@ class Paths:
                 heads[body] = heads[parent]
         return heads
 
-    def meet(self, one: int, other: int) -> int:
+    def common_ancestor(self, one: int, other: int) -> int:
         """Lowest common ancestor of two bodies; a body is its own ancestor."""
         rank, heads = self._rank, self._heads
         while one != GROUND and other != GROUND and heads[one] != heads[other]:
@@ -69,17 +69,17 @@ class Paths:
                 other = self.parent[heads[other]]
         return one if rank[one] < rank[other] else other
 
-    def closes_at(self, ends: Iterable[int]) -> int:
+    def closing_body(self, ends: Iterable[int]) -> int:
         """Lowest common ancestor of all ends."""
         by_rank = sorted(ends, key=self._rank.__getitem__)
-        return self.meet(by_rank[0], by_rank[-1])
+        return self.common_ancestor(by_rank[0], by_rank[-1])
 
-    def crossed(self, group: RowGroup) -> Iterator[tuple[int, int]]:
+    def crossed_bodies(self, group: RowGroup) -> Iterator[tuple[int, int]]:
         """Bodies across whose inboard hinge a group is pending, with a count of ends.
 
         Yields (body, number of ends on it or outboard of it).
         """
-        ancestor = self.closes_at(group.ends)
+        ancestor = self.closing_body(group.ends)
         counts: dict[int, int] = {}
         for end in group.ends:
             body = end
@@ -100,8 +100,8 @@ class Paths:
             count[ends[0]] += group.count
             for left_end, right_end in pairwise(ends):
                 count[right_end] += group.count
-                count[self.meet(left_end, right_end)] -= group.count
-            count[self.meet(ends[0], ends[-1])] -= group.count
+                count[self.common_ancestor(left_end, right_end)] -= group.count
+            count[self.common_ancestor(ends[0], ends[-1])] -= group.count
         for body in reversed(self.order):
             count[self.parent[body]] += count[body]
         return count[:GROUND]

@@ -119,48 +119,62 @@ class _KernelDifferentiation(Interpreter):
         ):
             raise ValueError(f"{kernel.name}: no port {name!r} to differentiate")
         self.directions = [port for port in kernel.inputs if port.name in ports]
-        self.moving = {port.name: port for port in self.directions}
-        self.wanted = [port for port in kernel.outputs if port.name in differentiated_names]
-        self.kept = [p for p in kernel.outputs if values or p.name in solved_names]
+        self.varied_ports = {port.name: port for port in self.directions}
+        self.differentiated_outputs = [
+            port for port in kernel.outputs if port.name in differentiated_names
+        ]
+        self.kept_outputs = [p for p in kernel.outputs if values or p.name in solved_names]
         self.stores: dict[str, list[tuple[Index, Node]]] = {}
-        self.read_again: dict[str, Port] = {}
-        self.still: list[Port] = []
+        self.reread_outputs: dict[str, Port] = {}
+        self.constant_inputs: list[Port] = []
 
     def run(self) -> KernelIR:
         super().run()
         contents: dict[str, object] = {}
-        for port in self.kept:
+        for port in self.kept_outputs:
             if port.name in self.stores:
-                self._put(contents, port, dict(self.stores[port.name]), port.name)
-        reread = [port for name, port in self.read_again.items() if port not in self.wanted]
-        self.wanted = [p for p in self.kernel.outputs if p in self.wanted or p in reread]
-        stored = [(p, *entry) for p in self.wanted for entry in self.stores.get(p.name, [])]
+                self._store_output(contents, port, dict(self.stores[port.name]), port.name)
+        reread = [
+            port
+            for name, port in self.reread_outputs.items()
+            if port not in self.differentiated_outputs
+        ]
+        self.differentiated_outputs = [
+            p for p in self.kernel.outputs if p in self.differentiated_outputs or p in reread
+        ]
+        stored = [
+            (p, *entry)
+            for p in self.differentiated_outputs
+            for entry in self.stores.get(p.name, [])
+        ]
         slopes = derivatives([node for _, _, node in stored], self._seeds())
-        for port in self.wanted:
+        for port in self.differentiated_outputs:
             pairs = zip(stored, slopes, strict=True)
             entries = {index: slope for (owner, index, _), slope in pairs if owner is port}
-            if port in self.still:
+            if port in self.constant_inputs:
                 entries = dict.fromkeys(_indices(port.shape), self.graph.constant(0))
             if entries:
-                self._put(contents, _derivative_port(port), entries, port.name)
+                self._store_output(contents, _derivative_port(port), entries, port.name)
         kernel = self.kernel
-        reread_inputs = [port for port in self.read_again.values() if port not in self.kept]
+        reread_inputs = [
+            port for port in self.reread_outputs.values() if port not in self.kept_outputs
+        ]
         return self.graph.kernel(
             f"{kernel.name}_tangent",
             (*kernel.inputs, *reread_inputs, *map(_derivative_port, self.directions)),
-            (*self.kept, *map(_derivative_port, self.wanted)),
+            (*self.kept_outputs, *map(_derivative_port, self.differentiated_outputs)),
             contents,
             kernel.size_symbol,
             f"{kernel.name} and its derivative along a direction",
             kernel.sources,
         )
 
-    def _put(
+    def _store_output(
         self, contents: dict[str, object], port: Port, entries: Mapping[Index, Node], name: str
     ) -> None:
         """Store an output at the kernel's end, or at once where the kernel reads it again."""
         nested = _nest(port.shape, entries)
-        if name in self.read_again:
+        if name in self.reread_outputs:
             self.graph.store(port, nested)
         else:
             contents[port.name] = nested
@@ -171,7 +185,7 @@ class _KernelDifferentiation(Interpreter):
     def entry(self, element: Element) -> Node:
         if element.port in self.stores:
             port = next(port for port in self.kernel.outputs if port.name == element.port)
-            self.read_again[port.name] = port
+            self.reread_outputs[port.name] = port
         return self.graph.element(element.port, *element.index)
 
     def total(self, statement: Sum) -> Node:
@@ -196,27 +210,27 @@ class _KernelDifferentiation(Interpreter):
         """Request the solve, and that of its derivative unless the derivative is zero."""
         self._refuse_stored(solve.matrix)
         self._refuse_stored(solve.right)
-        if solve.matrix in self.moving:
+        if solve.matrix in self.varied_ports:
             raise ValueError(
                 f"{self.kernel.name}: the matrix {solve.matrix!r} of a run-time sized solve "
                 "depends on differentiated inputs; differentiate the kernel at a fixed size"
             )
         options = solve.code, solve.message, solve.symmetric
         self.graph.solve(solve.port, solve.matrix, solve.right, *options)
-        port = next(port for port in self.wanted if port.name == solve.port)
-        if solve.right in self.moving:
+        port = next(port for port in self.differentiated_outputs if port.name == solve.port)
+        if solve.right in self.varied_ports:
             output, right = DERIVATIVE_PREFIX + solve.port, DERIVATIVE_PREFIX + solve.right
             self.graph.solve(output, solve.matrix, right, *options)
-            self.moving[port.name] = port
+            self.varied_ports[port.name] = port
         else:
-            self.still.append(port)
+            self.constant_inputs.append(port)
 
     def _seeds(self) -> dict[Node, Node | Number]:
         """Derivative of every entry that varies: an entry of `d_<port>`."""
         element = self.graph.element
         return {
             element(port.name, *index): element(DERIVATIVE_PREFIX + port.name, *index)
-            for port in (*self.moving.values(), *self.read_again.values())
+            for port in (*self.varied_ports.values(), *self.reread_outputs.values())
             for index in _read_indices(port.shape)
         }
 
@@ -226,7 +240,7 @@ class _JacobianBuilder(_KernelDifferentiation):
 
     def run(self) -> KernelIR:
         Interpreter.run(self)
-        (port,), (output,) = self.directions, self.wanted
+        (port,), (output,) = self.directions, self.differentiated_outputs
         stored = self.stores[output.name]
         rows = []
         for index in _read_indices(port.shape):

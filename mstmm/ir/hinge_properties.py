@@ -94,12 +94,12 @@ class HingeProperties:
         return len(self.speeds) == 6
 
     @property
-    def steady(self) -> bool:
+    def constant_subspace(self) -> bool:
         """Whether H is constant in outboard axes, the same in every position."""
         return not any("q" in rows for rows in self.varies)
 
     @property
-    def goes_anywhere(self) -> bool:
+    def is_free(self) -> bool:
         """Whether two or more translations of the hinge point are free."""
         return len(self.slides) > 1
 
@@ -107,19 +107,19 @@ class HingeProperties:
     def axial(self) -> bool:
         """Whether it moves only about and along z, in the same way in every position."""
         is_along_z = all(rows[:2] == "00" and rows[3:5] == "00" for rows in self.varies)
-        return bool(self.speeds) and is_along_z and self.steady
+        return bool(self.speeds) and is_along_z and self.constant_subspace
 
     @property
     def keeps_z(self) -> bool:
         """Whether it moves only in planes normal to z and rotates only about z."""
         return all(rows[2:5] == "000" for rows in self.varies)
 
-    def own_parameters(self) -> tuple[Param, ...]:
+    def extra_parameters(self) -> tuple[Param, ...]:
         """Parameters that a scene gives in the table `parameters` of the hinge."""
         frame_parameter_count = 1 if self.frame == "crossing" else 0
         return tuple(p for p in self.parameters[frame_parameter_count:] if p.name not in self.keys)
 
-    def at_start(self, p: Sequence[float] = ()) -> list[tuple[Vector, Vector]]:
+    def start_motion_columns(self, p: Sequence[float] = ()) -> list[tuple[Vector, Vector]]:
         """(translation, rotation) per unit of each speed at the start values.
 
         `p` holds the parameters of the kernel.  ValueError if H depends on them and their number
@@ -211,16 +211,16 @@ class _Dependence:
     """Dependence of the values of a kernel on parameters and coordinates."""
 
     def __init__(self, kernel: KernelIR) -> None:
-        self._of: dict[int, str] = {}
+        self._letters: dict[int, str] = {}
         for statement in kernel.statements:
             if isinstance(statement, Assign):
                 letters = {self._reads(argument) for argument in statement.args}
-                self._of[statement.number] = max(letters, default="")
+                self._letters[statement.number] = max(letters, default="")
 
     def _reads(self, operand: Operand) -> str:
         """Dependence: "" none, "p" on parameters only, "q" on coordinates or speeds too."""
         if isinstance(operand, Temporary):
-            return self._of[operand.number]
+            return self._letters[operand.number]
         if isinstance(operand, Element):
             return "p" if operand.port == "p" else "q"
         return ""

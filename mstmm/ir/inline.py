@@ -122,13 +122,13 @@ class _GraphInterpreter(LoopingInterpreter):
         n: int,
     ) -> None:
         super().__init__(kernel, graph.operations, n, inputs, graph.constant(0))
-        self.graph, self._judge = graph, judge
+        self.graph, self._condition_handler = graph, judge
 
     def constant(self, constant: Constant) -> Node:
         return self.graph.number(constant)
 
-    def judge(self, condition: Node, judged: Guard | Solve) -> None:
-        self._judge(condition, judged)
+    def handle_condition(self, condition: Node, judged: Guard | Solve) -> None:
+        self._condition_handler(condition, judged)
 
     def solve(self, solve: Solve) -> None:
         """Unroll the elimination that `Solve` specifies."""
@@ -140,7 +140,7 @@ class _GraphInterpreter(LoopingInterpreter):
                 self.graph,
                 [[a[n * j + i] for j in range(n)] for i in range(n)],
                 right,
-                lambda condition, i: self.judge(condition, solve),
+                lambda condition, i: self.handle_condition(condition, solve),
                 Fraction(str(solve.relative_pivot)),
             )
         else:

@@ -121,22 +121,18 @@ class LoopingInterpreter(Interpreter):
     """Interpreter that runs through loops; arrays are flat row-major lists, outputs start at 0."""
 
     def __init__(
-        self,
-        kernel: KernelIR,
-        operations: Operations,
-        n: int,
-        inputs: Mapping[str, Any],
-        zero: Any,
+        self, kernel: KernelIR, operations: Operations, n: int, inputs: Mapping[str, Any], zero: Any
     ) -> None:
         super().__init__(kernel, operations, n)
         self.zero = zero
         self.results = {port.name: [zero] * port.length(n) for port in kernel.outputs}
         self.arrays: dict[str, Any] = {
-            **{port.name: self._given(port, inputs) for port in kernel.inputs}, **self.results
-        }  # fmt: skip
-        self._at = dict.fromkeys(LOOPS, 0)
+            **{port.name: self._input_values(port, inputs) for port in kernel.inputs},
+            **self.results,
+        }
+        self._loop_indices = dict.fromkeys(LOOPS, 0)
 
-    def _given(self, port: Port, inputs: Mapping[str, Any]) -> Any:
+    def _input_values(self, port: Port, inputs: Mapping[str, Any]) -> Any:
         if port.name not in inputs:
             raise ValueError(f"{self.kernel.name}: no value for the input {port.name!r}")
         row = inputs[port.name]
@@ -148,32 +144,32 @@ class LoopingInterpreter(Interpreter):
         return row
 
     def entry(self, element: Element) -> Any:
-        return self.arrays[element.port][self._place(element.port, element.index)]
+        return self.arrays[element.port][self._entry_offset(element.port, element.index)]
 
-    def _place(self, name: str, index: tuple[int | str, ...]) -> int:
-        indices = self._at
+    def _entry_offset(self, name: str, index: tuple[int | str, ...]) -> int:
+        indices = self._loop_indices
         return self.ports[name].offset(index, self.n, indices[LOOP_INDEX], indices[INNER_INDEX])
 
     def total(self, statement: Sum) -> Any:
         total = self.zero
         for index in range(self.n):
-            self._at[statement.over] = index
+            self._loop_indices[statement.over] = index
             total = total + self.inside(statement)
         return total
 
     def store(self, store: Store) -> None:
         accumulate, row = self.ports[store.port].accumulate, self.results[store.port]
         for indices in product(range(self.n), repeat=len(store.loops)):
-            self._at.update(zip(store.loops, indices, strict=True))
+            self._loop_indices.update(zip(store.loops, indices, strict=True))
             value = self.inside(store)
-            offset = self._place(store.port, store.index)
+            offset = self._entry_offset(store.port, store.index)
             row[offset] = row[offset] + value if accumulate else value
 
     def guard(self, guard: Guard) -> None:
-        self.judge(self.value(guard.condition), guard)
+        self.handle_condition(self.value(guard.condition), guard)
 
     @abstractmethod
-    def judge(self, condition: Any, judged: Guard | Solve) -> None:
+    def handle_condition(self, condition: Any, judged: Guard | Solve) -> None:
         """Handle the condition of a guard, or of a pivot of a solve."""
 
 
@@ -259,16 +255,16 @@ class _NumberInterpreter(LoopingInterpreter):
             value = self._constants[constant.text] = self.arithmetic.constant(constant)
         return value
 
-    def judge(self, condition: Any, judged: Guard | Solve) -> None:
+    def handle_condition(self, condition: Any, judged: Guard | Solve) -> None:
         if not self.arithmetic.true(condition):
             raise GuardFailure(self.kernel.name, judged.code, judged.message)
 
     def solve(self, solve: Solve) -> None:
         """Solve with the order of operations of the generated C."""
-        solver = self._by_diagonal if solve.symmetric else self._by_rows
+        solver = self._solve_by_ldl if solve.symmetric else self._solve_by_lu
         self.results[solve.port][:] = solver(solve)
 
-    def _by_rows(self, solve: Solve) -> list[Any]:
+    def _solve_by_lu(self, solve: Solve) -> list[Any]:
         """Solve by LU with row exchange; right-hand sides are eliminated in the same pass."""
         n, a, b = self.n, self.arrays[solve.matrix], self.arrays[solve.right]
         m = len(b) // n if n else 0
@@ -283,7 +279,7 @@ class _NumberInterpreter(LoopingInterpreter):
                 if self.arithmetic.true(less(abs(rows[pivot_row][i]), abs(rows[k][i]))):
                     pivot_row = k
             rows[i], rows[pivot_row] = rows[pivot_row], rows[i]
-            self.judge(less(limit * sizes[i], abs(rows[i][i])), solve)
+            self.handle_condition(less(limit * sizes[i], abs(rows[i][i])), solve)
             scales.append(divide(one, rows[i][i]))
             for k in range(i + 1, n):
                 factor = rows[k][i] * scales[i]
@@ -296,7 +292,7 @@ class _NumberInterpreter(LoopingInterpreter):
                 rows[i][j] = rows[i][j] * scales[i]
         return [x for row in rows for x in row[n:]]
 
-    def _by_diagonal(self, solve: Solve) -> list[Any]:
+    def _solve_by_ldl(self, solve: Solve) -> list[Any]:
         """Solve by LDL^T without pivoting."""
         n, a, b = self.n, self.arrays[solve.matrix], self.arrays[solve.right]
         limit = self.arithmetic.number(solve.relative_pivot)
@@ -308,7 +304,7 @@ class _NumberInterpreter(LoopingInterpreter):
                 for k in range(j):
                     remainder = remainder - work[i * n + k] * work[j * n + k] * work[k * n + k]
                 work[i * n + j] = divide(remainder, work[j * n + j]) if j < i else remainder
-            self.judge(less(limit * abs(a[i * n + i]), work[i * n + i]), solve)
+            self.handle_condition(less(limit * abs(a[i * n + i]), work[i * n + i]), solve)
         m = len(b) // n if n else 0
         x = list(b)
         for column in range(m):

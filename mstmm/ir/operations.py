@@ -64,7 +64,7 @@ class Operation:
         return match[1] if match else ""
 
     @cached_property
-    def of_the_library(self) -> bool:
+    def is_c_library_function(self) -> bool:
         """Whether it is a C library function of one argument with this name."""
         return self.c == f"{self.name}({{0}})"
 

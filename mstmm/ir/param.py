@@ -11,7 +11,7 @@ class Param:
 
     name: str
     unit: str = ""
-    meaning: str = ""
+    description: str = ""
     default: float | None = None
     minimum: float | None = None
     maximum: float | None = None

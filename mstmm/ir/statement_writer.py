@@ -47,7 +47,7 @@ class _Level:
 
     def __init__(self, loops: int, outer: _Level | None, statements: list[Any]) -> None:
         self.loops, self.outer, self.statements = loops, outer, statements
-        self.known: dict[int, Operand] = {}
+        self.operands: dict[int, Operand] = {}
 
     def home(self, node: Node) -> _Level:
         """Outermost level inside all loops that `node` depends on."""
@@ -118,25 +118,25 @@ class Writer:
         while stack:
             node = stack[-1]
             node_level = level.home(node)
-            if node.number in node_level.known:
+            if node.number in node_level.operands:
                 stack.pop()
                 continue
             leaf = self._leaf(node)
             if leaf is not None:
-                node_level.known[node.number] = leaf
+                node_level.operands[node.number] = leaf
                 continue
             if node.op == "sum":
-                node_level.known[node.number] = self._emit_sum(node, node_level)
+                node_level.operands[node.number] = self._emit_sum(node, node_level)
                 continue
-            missing = [a for a in node.args if a.number not in level.home(a).known]
+            missing = [a for a in node.args if a.number not in level.home(a).operands]
             if missing:
                 stack.extend(reversed(missing))
                 continue
             number = self._number()
-            operands = tuple([level.home(a).known[a.number] for a in node.args])
+            operands = tuple([level.home(a).operands[a.number] for a in node.args])
             node_level.statements.append(Assign(number, node.op, operands))
-            node_level.known[node.number] = Temporary(number)
-        return level.home(root).known[root.number]
+            node_level.operands[node.number] = Temporary(number)
+        return level.home(root).operands[root.number]
 
     def _emit_sum(self, node: Node, home: _Level) -> Operand:
         over = str(node.leaf)

@@ -59,7 +59,11 @@ def _numerical_result(op: str, *args: Formula) -> Formula:
 
 def _power(base: Formula, exponent: Formula) -> Formula:
     """Power, multiplied out for small whole exponents."""
-    if not exponent.fixed or exponent.value % 1 or abs(exponent.value) > _MAX_EXPANDED_EXPONENT:
+    if (
+        not exponent.is_constant
+        or exponent.value % 1
+        or abs(exponent.value) > _MAX_EXPANDED_EXPONENT
+    ):
         return _apply_function("pow", base, exponent)
     product = formula(1.0)
     for _ in range(abs(int(exponent.value))):
@@ -78,7 +82,7 @@ def _square_root(x: Formula) -> Formula:
 
 def _select(condition: Formula, a: Formula, b: Formula) -> Formula:
     """Selection that keeps both branches unless they are equal or the condition is constant."""
-    if condition.fixed or a.terms == b.terms:
+    if condition.is_constant or a.terms == b.terms:
         return a if is_true(condition.value) else b
     return _apply_function("select", condition, a, b)
 
@@ -86,7 +90,9 @@ def _select(condition: Formula, a: Formula, b: Formula) -> Formula:
 def _nonnegative_root(x: Formula) -> Formula:
     """Square root, wrapped in abs where its formula could become negative."""
     result = _square_root(x)
-    is_nonnegative = result.fixed or any(atom.op == "sqrt" for m in result.terms for atom, _ in m)
+    is_nonnegative = result.is_constant or any(
+        atom.op == "sqrt" for m in result.terms for atom, _ in m
+    )
     return result if is_nonnegative else _apply_function("abs", result)
 
 

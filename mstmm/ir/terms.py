@@ -83,10 +83,10 @@ class Terms:
 
     def __init__(self) -> None:
         self._nodes: dict[tuple[object, ...], Node] = {}
-        self._whole: dict[int, Node] = {}
+        self._integers: dict[int, Node] = {}
         self._numbers: dict[str, Node] = {}
         self._count = 0
-        self._swapped: dict[int, Node] = {}
+        self._reversed_differences: dict[int, Node] = {}
 
     # --- leaves ---------------------------------------------------------------------------
 
@@ -107,9 +107,9 @@ class Terms:
             return self._make("constant", leaf=value)
         if type(value) is not int:
             return self._make("constant", leaf=Fraction(value))
-        node = self._whole.get(value)
+        node = self._integers.get(value)
         if node is None:
-            node = self._whole[value] = self._make("constant", leaf=Fraction(value))
+            node = self._integers[value] = self._make("constant", leaf=Fraction(value))
         return node
 
     def number(self, constant: Constant) -> Node:
@@ -162,7 +162,7 @@ class Terms:
             return self.sub(a, b.args[0])
         if a.op == "neg":
             return self.sub(b, a.args[0])
-        return self._ordered("add", a, b)
+        return self._commutative_node("add", a, b)
 
     def sub(self, a: Node, b: Node) -> Node:
         if a.kind or b.kind:
@@ -180,25 +180,25 @@ class Terms:
             return self.neg(self.add(a.args[0], b))
         opposite = self._nodes.get(("sub", None, b.number, a.number))
         if opposite is not None and ("sub", None, a.number, b.number) not in self._nodes:
-            return self.neg_of(opposite)
+            return self.separate_negation(opposite)
         return self._make("sub", (a, b))
 
-    def neg_of(self, a: Node) -> Node:
+    def separate_negation(self, a: Node) -> Node:
         """Separate node for -a, so that `a` stays shared (`neg` would reverse a difference)."""
         return self._make("neg", (a,))
 
     def mul(self, a: Node, b: Node) -> Node:
         if a.kind or b.kind:
-            product = self._scaled(a, b) if a.kind else self._scaled(b, a)
+            product = self._fold_product(a, b) if a.kind else self._fold_product(b, a)
             if product is not None:
                 return product
         if a.op == "neg":
             return self.neg(self.mul(a.args[0], b))
         if b.op == "neg":
             return self.neg(self.mul(b.args[0], a))
-        return self._ordered("mul", a, b)
+        return self._commutative_node("mul", a, b)
 
-    def _scaled(self, number: Node, other: Node) -> Node | None:
+    def _fold_product(self, number: Node, other: Node) -> Node | None:
         """Folded product with a constant; None where nothing can be folded."""
         if number.kind == _ZERO or other.kind == _ZERO:
             return self.constant(0)
@@ -229,14 +229,14 @@ class Terms:
     def power(self, a: Node, b: Node) -> Node:
         exponent = b.value
         if exponent is not None and exponent.denominator == 1 and abs(exponent.numerator) <= 16:
-            return self._whole_power(a, int(exponent))
+            return self._integer_power(a, int(exponent))
         if exponent == Fraction(1, 2):
             return self.call("sqrt", a)
         return self._make("pow", (a, b))
 
-    def _whole_power(self, a: Node, exponent: int) -> Node:
+    def _integer_power(self, a: Node, exponent: int) -> Node:
         if exponent < 0:
-            return self.div(self.constant(1), self._whole_power(a, -exponent))
+            return self.div(self.constant(1), self._integer_power(a, -exponent))
         result = self.constant(1)
         square = a
         while exponent:
@@ -247,7 +247,7 @@ class Terms:
                 square = self.mul(square, square)
         return result
 
-    def _ordered(self, op: str, a: Node, b: Node) -> Node:
+    def _commutative_node(self, op: str, a: Node, b: Node) -> Node:
         return self._make(op, (a, b) if a.number <= b.number else (b, a))
 
     def call(self, op: str, *args: Node | Number) -> Node:
@@ -265,7 +265,7 @@ class Terms:
             return nodes[1] if nodes[0].value != 0 else nodes[2]
         if op == "select" and nodes[1] is nodes[2]:
             return nodes[1]
-        return self._ordered(op, *nodes) if row.commutative else self._make(op, nodes)
+        return self._commutative_node(op, *nodes) if row.commutative else self._make(op, nodes)
 
     @cached_property
     def operations(self) -> Mapping[str, Callable[..., Node]]:
@@ -301,7 +301,7 @@ class Terms:
         """Node of the same value with the two loop variables exchanged."""
         if not node.loops:
             return node
-        swapped = self._swapped.get(node.number)
+        swapped = self._reversed_differences.get(node.number)
         if swapped is None:
             if isinstance(node.leaf, Element):
                 index = [_swap_letter(e) if isinstance(e, str) else e for e in node.leaf.index]
@@ -312,7 +312,7 @@ class Terms:
                 )
             else:
                 swapped = self.call(node.op, *(self._swap(a) for a in node.args))
-            self._swapped[node.number] = swapped
+            self._reversed_differences[node.number] = swapped
         return swapped
 
 

@@ -214,7 +214,5 @@ def _pivot_condition(
 
 def _guard_pivot(graph: Graph, condition: Node, i: int, n: int) -> None:
     graph.guard(
-        condition,
-        SINGULAR,
-        f"pivot {i + 1} of {n} vanishes: a motion of the hinge is undetermined",
+        condition, SINGULAR, f"pivot {i + 1} of {n} vanishes: a motion of the hinge is undetermined"
     )

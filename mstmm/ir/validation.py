@@ -36,7 +36,7 @@ class Check:
         self.writable = {port.name: port for port in outputs}
         self.stored: dict[str, set[tuple[int | str, ...]]] = {}
         self.defined: set[int] = set()
-        self.ever: set[int] = set()
+        self.ever_defined: set[int] = set()
         self.constants: set[str] = set()
 
     def fail(self, text: str) -> None:
@@ -108,9 +108,9 @@ class Check:
         self.define(assign.number)
 
     def define(self, number: int) -> None:
-        if number in self.ever:
+        if number in self.ever_defined:
             self.fail(f"t{number} is defined twice")
-        self.ever.add(number)
+        self.ever_defined.add(number)
         self.defined.add(number)
 
     def use(self, operand: Operand, loops: tuple[str, ...]) -> None:

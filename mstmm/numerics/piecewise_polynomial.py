@@ -40,17 +40,17 @@ class PiecewisePolynomial:
         return bool(self.knots)
 
     @property
-    def stands(self) -> bool:
+    def is_constant(self) -> bool:
         """Whether the value is constant in time."""
         return not self.knots and not any(self.pieces[0][2:])
 
-    def at(self, t: float) -> Piece:
+    def piece_at(self, t: float) -> Piece:
         """Piece that is valid at time t (s)."""
         return self.pieces[bisect_right(self.knots, t)]
 
     def value(self, t: float) -> float:
         """Value at time t (s)."""
-        t0, c0, c1, c2, c3 = self.at(t)
+        t0, c0, c1, c2, c3 = self.piece_at(t)
         s = t - t0
         return c0 + s * (c1 + s * (c2 + s * c3))
 

@@ -15,7 +15,7 @@ class Pose(NamedTuple):
     position: Vector = ZERO
     rotation: Matrix = IDENTITY
 
-    def then(self, inner: Pose) -> Pose:
+    def compose(self, inner: Pose) -> Pose:
         """Compose two poses: `inner` is given in this frame; the result in this frame's parent."""
         x, y, z = rotate(self.rotation, inner.position)
         a, b, c = self.position

@@ -38,13 +38,13 @@ Terms = dict[Monomial, Coefficient]
 class Atom:
     """Indeterminate of a polynomial: a symbol, or a function `op` of formulas."""
 
-    __slots__ = ("args", "book", "name", "op", "place", "value")
+    __slots__ = ("args", "book", "name", "op", "order", "value")
 
     def __init__(
         self, book: SymbolTable, op: str, args: tuple[Formula, ...], value: float, name: str = ""
     ) -> None:
         self.book, self.op, self.args, self.value, self.name = book, op, args, value, name
-        self.place = book.next_place()
+        self.order = book.next_order()
 
 
 class SymbolTable:
@@ -55,8 +55,8 @@ class SymbolTable:
     """
 
     def __init__(self, most: int) -> None:
-        self._most, self._products, self._places = most, 0, 0
-        self._known: dict[object, Atom] = {}
+        self._max_products, self._products, self._atom_count = most, 0, 0
+        self._atoms: dict[object, Atom] = {}
 
     def symbol(self, name: str, value: float) -> Formula:
         """Create a symbol with its value."""
@@ -65,22 +65,22 @@ class SymbolTable:
     def atom(self, op: str, args: tuple[Formula, ...], value: float) -> Atom:
         """Atom of the function `op` of formulas, created at the first call."""
         key = (op, *(frozenset(x.terms.items()) for x in args))
-        if key not in self._known:
-            self._known[key] = Atom(self, op, args, value)
-        return self._known[key]
+        if key not in self._atoms:
+            self._atoms[key] = Atom(self, op, args, value)
+        return self._atoms[key]
 
-    def next_place(self) -> int:
+    def next_order(self) -> int:
         """Reserve the order number of the next atom."""
-        self._places += 1
-        return self._places
+        self._atom_count += 1
+        return self._atom_count
 
-    def count(self, products: int) -> None:
+    def count_products(self, products: int) -> None:
         """Count products of terms before they are computed; raise SceneError above the limit."""
         self._products += products
-        if self._products > self._most:
+        if self._products > self._max_products:
             raise SceneError(
                 f"formulas: {self._products} products of terms exceed the limit of "
-                f"{self._most}; keep fewer names as symbols, or use a smaller scene"
+                f"{self._max_products}; keep fewer names as symbols, or use a smaller scene"
             )
 
 
@@ -97,17 +97,17 @@ class Formula:
         self.value, self.terms = value, terms
 
     @property
-    def fixed(self) -> bool:
+    def is_constant(self) -> bool:
         """Whether the formula contains no symbol."""
         return not self.terms or (len(self.terms) == 1 and () in self.terms)
 
     def __bool__(self) -> bool:
-        return not self.fixed or self.value != 0
+        return not self.is_constant or self.value != 0
 
     def __eq__(self, other: object) -> bool:
         if isinstance(other, Formula):
             return self.value == other.value and self.terms == other.terms
-        return self.fixed and self.value == other
+        return self.is_constant and self.value == other
 
     def __hash__(self) -> int:
         return hash(self.value)
@@ -198,7 +198,7 @@ def to_exact(x: float) -> Coefficient:
 def square_root(x: Formula, value: float | None = None) -> Formula:
     """Square root of a formula; the root of a single even term is that term, with its sign."""
     root_value = math.sqrt(x.value) if value is None else value
-    if x.fixed:
+    if x.is_constant:
         return Formula(root_value, _constant_terms(to_exact(root_value)))
     even_terms = _even_root(x)
     return Formula(
@@ -208,7 +208,7 @@ def square_root(x: Formula, value: float | None = None) -> Formula:
 
 def apply_function(op: str, args: tuple[Formula, ...], value: float) -> Any:
     """Function of formulas by its name in the IR, with its known value."""
-    if all(x.fixed for x in args):
+    if all(x.is_constant for x in args):
         return Formula(value, _constant_terms(to_exact(value)))
     return Formula(value, _atom_terms(op, args, value))
 
@@ -255,7 +255,7 @@ def _scale(terms: Terms, factor: Coefficient) -> Terms:
 
 def _add_scaled(a: Terms, b: Terms, sign: int) -> Terms:
     if len(a) + len(b) > _TERMS_PER_PRODUCT:
-        _table_of(a if len(a) > 1 else b).count((len(a) + len(b)) // _TERMS_PER_PRODUCT)
+        _table_of(a if len(a) > 1 else b).count_products((len(a) + len(b)) // _TERMS_PER_PRODUCT)
     terms = dict(a)
     _accumulate(terms, b, sign)
     return terms
@@ -273,7 +273,7 @@ def _accumulate(found: Terms, more: Terms, factor: Coefficient) -> None:
 
 def _multiply(a: Terms, b: Terms) -> Terms:
     if len(a) * len(b) > _MAX_UNCOUNTED_PRODUCTS:
-        _table_of(a if len(a) > 1 else b).count(len(a) * len(b))
+        _table_of(a if len(a) > 1 else b).count_products(len(a) * len(b))
     terms: Terms = {}
     for left, c in a.items():
         for right, d in b.items():
@@ -293,7 +293,7 @@ def _merge_monomials(a: Monomial, b: Monomial) -> Monomial:
 
 
 def _atom_index(factor: tuple[Atom, int]) -> int:
-    return factor[0].place
+    return factor[0].order
 
 
 def _is_normal(factor: tuple[Atom, int]) -> bool:
@@ -341,7 +341,7 @@ def _invert(x: Formula) -> Terms:
 
     Raises ZeroDivisionError for what is zero whatever the symbols are.
     """
-    if x.fixed:
+    if x.is_constant:
         return _constant_terms(_reciprocal(x.terms.get((), Fraction(0))))
     (monomial, c), *monomial_terms = x.terms.items()
     if not monomial_terms:
@@ -373,7 +373,7 @@ def _even_root(x: Formula) -> Terms | None:
 
 
 def _atom_terms(op: str, args: tuple[Formula, ...], value: float) -> Terms:
-    table = next(_table_of(x.terms) for x in args if not x.fixed)
+    table = next(_table_of(x.terms) for x in args if not x.is_constant)
     return {((table.atom(op, args, value), 1),): Fraction(1)}
 
 

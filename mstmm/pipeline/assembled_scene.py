@@ -27,17 +27,19 @@ def assembled_scene(model: Model) -> Scene:
     q, u = model.initial_state()
     data = tomllib.loads(model.scene.to_toml())
     for hinge in data.get("hinge", ()):
-        slots = model.layout.hinges[hinge["name"]]
+        slots = model.coordinate_layout.hinges[hinge["name"]]
         is_prescribed = "drive" in hinge and "free" not in np.atleast_1d(hinge["drive"]).tolist()
         if slots.nu and not is_prescribed:
             hinge["initial"] = _initial_table(q[slots.q_slice], u[slots.u_slice], "q", "u")
     for body in (*data.get("beam", ()), *data.get("elastic", ())):
-        slots = model.layout.modal[body["name"]]
+        slots = model.coordinate_layout.modal[body["name"]]
         if slots.nu:
             body["initial"] = _initial_table(q[slots.q_slice], u[slots.u_slice], "eta", "etad")
     for constraint in data.get("constraint", ()):
         if constraint["type"] == CURVE:
-            constraint["start"] = float(q[model.layout.along(constraint["name"]).q])
+            constraint["start"] = float(
+                q[model.coordinate_layout.curve_slots(constraint["name"]).q]
+            )
     _require_common_starts(model, q, u)
     return Scene.from_data(data)
 
@@ -49,7 +51,7 @@ def _initial_table(q: Array, u: Array, place: str, rate: str) -> dict[str, Any]:
 def _require_common_starts(model: Model, q: Array, u: Array) -> None:
     hinges = model.scene.hinges
     for number in range(len(hinges.tables), len(hinges)):
-        hinge, slots = hinges[number], model.layout.hinges[hinges.name(number)]
+        hinge, slots = hinges[number], model.coordinate_layout.hinges[hinges.name(number)]
         initial = hinge.initial
         if initial is None:
             continue

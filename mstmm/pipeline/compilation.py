@@ -30,7 +30,7 @@ class GeneratedElement:
 
     spec: ElementSpec
     folder: Path
-    how: str
+    execution: str
 
 
 def compile_scene(
@@ -82,7 +82,7 @@ def compile_scene(
         raise SceneError(f"{scene!r:.60}: expected a Scene, or the path of a scene file")
     model = compile_level(scene, engine, sweep, accuracy, bake, flexibility, simplify)
     if flexibility is None:
-        model.refuse_unknown_outputs()
+        model.check_outputs()
     return model
 
 
@@ -125,7 +125,7 @@ def compile_level(
             "bake = True writes the numbers of the scene into its code; "
             'it requires engine = "fused"'
         )
-    obstacle = "asked for" if engine == "looped" else ""
+    obstacle = "requested" if engine == "looped" else ""
     max_bodies = MAX_BODIES if engine == "fused" else DEFAULT_MAX_BODIES
 
     fuser = FusionFactory(definitions, obstacle, bake, max_bodies)
@@ -137,7 +137,7 @@ def compile_level(
         model = _model_with_accurate_sweep(build_model, engine)
     else:
         model = build_model(sweep if product is None else "riccati")
-    model.refuse_undetermined_start()
+    model.check_start_determined()
     if engine == "fused":
         model.fusion.build()
     elif engine == "auto":

@@ -63,13 +63,13 @@ def crosscheck(kind: str, name: str, points: int = 2) -> CrossCheckReport:
         return subject.report(points, ())
     if compiled is not None:  # instances of other elements with some known numbers
         text = (files("mstmm") / "generated" / f"{kind}_{name}.json").read_text(encoding="utf-8")
-        subject = _Subject.stored(element_from_json(text), compiled)
+        subject = _Subject.from_store(element_from_json(text), compiled)
         return subject.report(points, ("its equations are those of the general element",))
     stored = kernel_store.find_spec((kind, name))
     if stored is None:
         raise ElementError(f"there is no {kind} named {name!r}; mstmm list shows all elements")
     compiled = kernel_store.open_element((kind, name), stored.hash())
-    subject = _Subject.stored(stored, compiled)
+    subject = _Subject.from_store(stored, compiled)
     return subject.report(
         points, ("its definition is not stored; give its file to check the equations too",)
     )
@@ -150,7 +150,7 @@ class _Subject:
     interpreted: bool = False  # kernels without a C function, by the engine's interpreter
 
     @classmethod
-    def stored(cls, spec: ElementSpec, compiled: Compiled) -> _Subject:
+    def from_store(cls, spec: ElementSpec, compiled: Compiled) -> _Subject:
         from ..derive.verification.sample_points import InputSampler
 
         source = InputSampler(spec.kind, spec.coordinates, spec.parameters)
@@ -159,7 +159,7 @@ class _Subject:
 
     def report(self, points: int, remarks: tuple[str, ...]) -> CrossCheckReport:
         checks = tuple(self._kernel(kernel, points) for kernel in self.irs.values())
-        statements = tuple(Statement(*row) for row in self._judged())
+        statements = tuple(Statement(*row) for row in self._evaluate_statements())
         return CrossCheckReport(self.kind, self.name, checks, statements, remarks)
 
     # --- one kernel -----------------------------------------------------------------------------
@@ -224,11 +224,13 @@ class _Subject:
         if stated is not None and stated.asymmetry > 1e-30 * _largest_input(inputs):
             return "a quantity declared as symmetric is not symmetric"
         compiled_error = (
-            0.0 if compiled_result is None else self._share(kernel, rounded, compiled_result[1], n)
+            0.0
+            if compiled_result is None
+            else self._error_ratio(kernel, rounded, compiled_result[1], n)
         )
         return equation_error, compiled_error
 
-    def _share(
+    def _error_ratio(
         self,
         kernel: KernelIR,
         inputs: dict[str, list[float]],
@@ -276,7 +278,7 @@ class _Subject:
             return evaluate_equations(self.stated[name].derivation, inputs, (), DIGITS).outputs
         return evaluate(self.irs[name], inputs, DIGITS)
 
-    def _judged(self) -> list[tuple[str, float, float]]:
+    def _evaluate_statements(self) -> list[tuple[str, float, float]]:
         """Evaluate all statements of mechanics.
 
         ElementError if the equations have no value for numbers within the bounds of the definition.
@@ -313,7 +315,7 @@ class _Subject:
             property_rows = mechanics_checks.hinge_properties(
                 self._precisely, generic, self.source, self.nu
             )
-            yield from self._in_doubles()
+            yield from self._compare_in_doubles()
         elif self.kind == "body":
             property_rows = mechanics_checks.body_properties(
                 self._precisely, self.source, parameter_count
@@ -332,7 +334,7 @@ class _Subject:
         for kernel, error in slope_errors(self.irs, self.source):
             yield f"{kernel} = difference quotient", error, MAX_DERIVATIVE_ERROR
 
-    def _in_doubles(self) -> Iterator[tuple[str, float, float]]:
+    def _compare_in_doubles(self) -> Iterator[tuple[str, float, float]]:
         """Compare the compiled specialised kernels with the compiled generic ones."""
         from ..derive.catalogue.kernels import generic_kernels
         from ..runtime.kernels import prebuilt_kernels

@@ -128,7 +128,7 @@ def _element_page(of: str | Element, keep: Sequence[str]) -> EquationSheet:
 
 
 def _model_page(model: Model, keep: Sequence[str] = ()) -> EquationSheet:
-    """Equations of a scene; see `equations`."""
+    """Sheet of a scene: its tree and passes, and closed equations where they are short enough."""
     closed_form: SymbolicEquations | None = None
     reason = ""
     try:
@@ -154,7 +154,7 @@ def _items(
         Paragraph(f"Equations of its elements: {elements}."),
         Heading("Passes of the sweep", 2),
     ]
-    if model.loops.cut:
+    if model.loops.cut_hinges:
         items.append(
             Paragraph(
                 "Loads of closed loops are computed in addition: mstmm show sweep_loops, "
@@ -172,7 +172,7 @@ def _items(
 
 
 def _closed_form_items(found: SymbolicEquations, measure: TextWidth) -> list[Item]:
-    free = [found.speeds[k] for k in found.free]
+    free = [found.speeds[k] for k in found.free_speed_indices]
     rates = sp.Matrix([sp.Symbol(f"udot{str(motion.symbol)[1:]}") for motion in free])
     names = tuple(str(motion.symbol).partition("_")[2] for motion in free)
     n = len(free)

@@ -31,7 +31,7 @@ def extended_precision_accelerations(
     the engines use.
     """
     elements, definitions = kernel_store.load_known(kernel_store.required_types(model.scene))
-    structure, numbers = structure_of(model.packed.system, elements, False)
+    structure, numbers = structure_of(model.packed_scene.system, elements, False)
     kernel = _fused_kernel(structure, definitions)
     constant_inputs = {"memory": [0.0] * structure.n_memory, "efforts": [0.0] * structure.nu}
     fixed_inputs = {"p": _floats(numbers), "t": [t], **constant_inputs}

@@ -32,7 +32,7 @@ from ..runtime.packing.fused_structure import structure_of
 
 if TYPE_CHECKING:
     from ..derive.fuse.scene_kernels import FusedSceneIR
-    from ..runtime.engine.live_inputs import Places
+    from ..runtime.engine.live_inputs import IndexPairs
     from ..runtime.linear.linear_equations import LinearEquations
     from ..runtime.linear.symbolic_matrices import SymbolicLinearModel
     from ..runtime.packing.packed_scene import PackedScene
@@ -66,10 +66,7 @@ _MODES_PER_BODY = 24
 _ROWS_PER_BODY = 32
 
 #: Folders of the code that prints fused code; with structure and kernels they determine its text.
-PRINTER_FOLDERS = {
-    "mstmm": ("abi", "ir"),
-    "mstmm.derive": ("fuse", "codegen", "schedule"),
-}
+PRINTER_FOLDERS = {"mstmm": ("abi", "ir"), "mstmm.derive": ("fuse", "codegen", "schedule")}
 
 
 class Fusion:
@@ -92,33 +89,33 @@ class Fusion:
         }
         self._definitions = {**definitions, **user_specs}
         self.obstacle = obstacle or _obstacle(packed, most)
-        self.made: dict[str, FusedLibrary] = {}
+        self.libraries: dict[str, FusedLibrary] = {}
         self.note = ""
-        self._insisted = False  # engine="fused": batches too
-        self.inputs: Places = ()
+        self._is_required = False  # engine="fused": batches too
+        self.inputs: IndexPairs = ()
         if not self.obstacle:
             self.structure, self.numbers = structure_of(packed.system, known, bake, packed.floors)
             self.structure = replace(self.structure, refines=int(packed.model.refines))
             self.inputs = self.structure.inputs
             self.obstacle = _loop_obstacle(self.structure, most)
-        self._looped_by_nature = bool(self.obstacle)
+        self._is_always_looped = bool(self.obstacle)
 
     @property
     def library(self) -> FusedLibrary | None:
         """Scalar library if it has been found or built, else None; the others likewise."""
-        return self.made.get("scalar")
+        return self.libraries.get("scalar")
 
     @property
     def lanes(self) -> FusedLibrary | None:
-        return self.made.get("lanes")
+        return self.libraries.get("lanes")
 
     @property
     def implicit(self) -> FusedLibrary | None:
-        return self.made.get("implicit")
+        return self.libraries.get("implicit")
 
     @property
     def inverse(self) -> FusedLibrary | None:
-        return self.made.get("inverse")
+        return self.libraries.get("inverse")
 
     def find(self) -> FusedLibrary | None:
         """Find the scalar library in the cache; no compiler is started."""
@@ -130,9 +127,9 @@ class Fusion:
         Raises SceneError if such a scene cannot have fused code, EnvironmentFailure if there is no
         compiler or it fails.
         """
-        self._insisted = True
+        self._is_required = True
         library = self._get("scalar", build=True)
-        if library is None and self._looped_by_nature:
+        if library is None and self._is_always_looped:
             raise SceneError(
                 f'scene: no fused code: {self.obstacle}; use engine = "auto" or "looped"'
             )
@@ -149,14 +146,14 @@ class Fusion:
         if self.obstacle or other.obstacle:
             return
         if self.structure == other.structure:
-            self.made, self.note = other.made, other.note
+            self.libraries, self.note = other.libraries, other.note
         elif other.library is not None:
             try:
                 self.build()
             except EnvironmentFailure as error:
                 self.obstacle = str(error)
 
-    def under(self, system: System) -> Self:
+    def for_system(self, system: System) -> Self:
         """Fusion of a system that differs from this one only in its inputs."""
         fusion = copy(self)
         if not self.obstacle:
@@ -176,7 +173,7 @@ class Fusion:
         After `build` it is compiled whatever the number of evaluations; raises EnvironmentFailure
         if that fails.
         """
-        if self._insisted:
+        if self._is_required:
             return self._get("lanes", build=True)
         return self._ready("lanes", evaluations)
 
@@ -187,37 +184,39 @@ class Fusion:
         engine is used instead: for large scenes, closed loops, and if it cannot be compiled.
         """
         is_worthwhile = self._break_even() < evaluations < math.inf
-        return self._of_small("implicit", is_worthwhile)
+        return self._small_scene_library("implicit", is_worthwhile)
 
     def ready_linear(self, pays: bool) -> FusedLibrary | None:
         """Library of derivatives about a state for linear models; the caller decides if it pays."""
         if not self.obstacle and self.structure.nu > _MAX_UNKNOWNS:
             has_few_pairs = _speed_pair_count(self.structure) <= _MAX_SPEED_PAIRS
-            return self._of_trees("linear", pays) if has_few_pairs else None
-        return self._of_small("linear", pays)
+            return self._tree_library("linear", pays) if has_few_pairs else None
+        return self._small_scene_library("linear", pays)
 
     def ready_inverse(self, calls: float) -> FusedLibrary | None:
         """Library of inverse dynamics and mass matrix, for trees without prescribed motion."""
         if self.obstacle or not self.structure.nu or self.structure.drives is not None:
             return None
-        return self._of_trees("inverse", calls > self._break_even())
+        return self._tree_library("inverse", calls > self._break_even())
 
     def ready_points(self, body: int, calls: float) -> FusedLibrary | None:
         """Library of the kinematics of points of a body; closed loops do not matter."""
         if self.obstacle or body < 0 or not self.structure.nu:
             return None
-        min_calls = _MIN_POINT_CALLS if self._insisted else self._break_even()
-        return self._sought(f"points {body}", build=calls >= min_calls)
+        min_calls = _MIN_POINT_CALLS if self._is_required else self._break_even()
+        return self._find_or_build(f"points {body}", build=calls >= min_calls)
 
-    def _of_small(self, part: str, pays: bool) -> FusedLibrary | None:
+    def _small_scene_library(self, part: str, pays: bool) -> FusedLibrary | None:
         if self.obstacle or not 0 < self.structure.nu <= _MAX_UNKNOWNS:
             return None
-        return self._of_trees(part, pays)
+        return self._tree_library(part, pays)
 
-    def _of_trees(self, part: str, pays: bool) -> FusedLibrary | None:
-        return None if self.structure.closes else self._sought(part, self._insisted or pays)
+    def _tree_library(self, part: str, pays: bool) -> FusedLibrary | None:
+        return (
+            None if self.structure.closes else self._find_or_build(part, self._is_required or pays)
+        )
 
-    def _sought(self, part: str, build: bool) -> FusedLibrary | None:
+    def _find_or_build(self, part: str, build: bool) -> FusedLibrary | None:
         try:
             return self._get(part, build)
         except EnvironmentFailure:
@@ -239,7 +238,7 @@ class Fusion:
         return seconds / (_SECONDS_SAVED_PER_BODY * max(1, sum(1 + 2 * count for count in modes)))
 
     def _get(self, part: str, build: bool) -> FusedLibrary | None:
-        library = self.made.get(part)
+        library = self.libraries.get(part)
         if library is not None or self.obstacle:
             return library
         recipe = self._recipe(part)
@@ -252,7 +251,7 @@ class Fusion:
             if build:
                 raise
         if library is not None:
-            self.made[part] = library
+            self.libraries[part] = library
         return library
 
     def _recipe(self, part: str) -> Recipe:
@@ -273,7 +272,7 @@ class Fusion:
             fuse_structure = {
                 "implicit": self.fused_implicit, "linear": self.fused_linear,
                 "inverse": self.fused_inverse,
-            }.get(purpose, self.fused)  # fmt: skip
+            }.get(purpose, self.structure_ir)  # fmt: skip
             fused_ir = fuse_structure(self.structure)
         return fused_sources(fused_ir, key, part)
 
@@ -324,7 +323,7 @@ class Fusion:
 
         return self.columns(self.structure, kernels, "solution", build)
 
-    def fused(self, structure: Structure) -> FusedSceneIR:
+    def structure_ir(self, structure: Structure) -> FusedSceneIR:
         """IR of a structure with the elements of this scene; no compiler, no cache."""
         from ..derive.fuse.scene_kernels import fuse
 
@@ -368,10 +367,10 @@ class FusionFactory:
     definitions: Mapping[Key, ElementSpec]
     obstacle: str
     bake: bool
-    most: int
+    max_bodies: int
 
     def __call__(self, packed: PackedScene, known: Known) -> Fusion:
-        return Fusion(packed, known, self.definitions, self.obstacle, self.bake, self.most)
+        return Fusion(packed, known, self.definitions, self.obstacle, self.bake, self.max_bodies)
 
 
 def mode_counts(structure: Structure) -> list[int]:
@@ -422,7 +421,7 @@ def _obstacle(packed: PackedScene, most: int) -> str:
         return "the product of classical matrices exists only in the looped engine"
     if packed.qr:
         return "the least-squares sweep exists only in the looped engine"
-    if packed.model.refines and packed.system.closes:
+    if packed.model.refines and packed.system.has_loops:
         return (
             "heavy bodies outboard of light ones need refinement, which exists for closed loops "
             "only in the looped engine"

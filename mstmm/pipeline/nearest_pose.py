@@ -26,7 +26,7 @@ def nearest_pose_result(scene: Scene, error: LoopClosureError) -> Result:
     model = compile_scene(_tree_scene(scene), engine="looped")
     q, _ = model.initial_state()
     q = np.array(q)
-    for name, slots in {**model.layout.hinges, **model.layout.modal}.items():
+    for name, slots in {**model.coordinate_layout.hinges, **model.coordinate_layout.modal}.items():
         if name in error.pose:
             q[slots.q_slice] = error.pose[name]
     return model.simulate(0.0, initial=(q, np.zeros(model.nu)))
@@ -35,7 +35,7 @@ def nearest_pose_result(scene: Scene, error: LoopClosureError) -> Result:
 def _tree_scene(scene: Scene) -> Scene:
     """Scene with the bodies and the hinges of its spanning tree only."""
     hinges = scene.skeleton.hinges
-    cut_hinges = {hinges.name(number) for number in build_topology(scene.skeleton).cut}
+    cut_hinges = {hinges.name(number) for number in build_topology(scene.skeleton).cut_hinges}
     data = {k: v for k, v in tomllib.loads(scene.to_toml()).items() if k not in _LOAD_TABLES}
     data["hinge"] = [
         {key: value for key, value in hinge.items() if key not in _MOTION_KEYS}

@@ -49,23 +49,25 @@ class SymbolicEquations:
     Attributes:
         M: mass matrix, (n, n) `sympy.ImmutableMatrix`.
         h: bias force (n, 1): efforts at u' = 0, including gravity, hinge laws and loads.
-        coordinates, speeds: all of the scene, in its order; `free` are the indices of the n.
+        coordinates, speeds: all of the scene, in its order; `free_speed_indices` are the indices of
+            the n.
         accelerations: symbols of the prescribed accelerations, which occur in h.
         inputs: symbols by name ("push") of the values at t of inputs and signals that occur, and of
             rates of those that drives follow ("push.rates[0]", 1/s; "push.rates[1]", 1/s^2).
         parameters: symbols by name.
-        numbers: values of the symbols at the start; `M.subs(numbers)` is the mass matrix there.
+        parameter_values: values of the symbols at the start; `M.subs(numbers)` is the mass matrix
+            there.
     """
 
     M: Any = field(repr=False)
     h: Any = field(repr=False)
     coordinates: tuple[Motion, ...]
     speeds: tuple[Motion, ...]
-    free: tuple[int, ...]
+    free_speed_indices: tuple[int, ...]
     accelerations: tuple[Any, ...]
     inputs: Mapping[str, Any]
     parameters: Mapping[str, Any]
-    numbers: Mapping[Any, float] = field(repr=False)
+    parameter_values: Mapping[Any, float] = field(repr=False)
 
 
 def symbolic_equations(model: Model, keep: Sequence[str] = ()) -> SymbolicEquations:
@@ -85,13 +87,13 @@ def symbolic_equations(model: Model, keep: Sequence[str] = ()) -> SymbolicEquati
 
 
 def _require_small_tree(model: Model) -> None:
-    scene = model.packed
+    scene = model.packed_scene
     if model.nu > MAX_SPEEDS:
         raise SceneError(
             f"equations in closed form: expected at most {MAX_SPEEDS} speeds, found {model.nu}; "
             "use mass_matrix and inverse_dynamics, which give numbers"
         )
-    if model.loops.cut:
+    if model.loops.cut_hinges:
         raise SceneError(
             "equations in closed form: expected a tree, found a scene with closed loops; open "
             "them, or use linearize, which supports loops"
@@ -110,13 +112,13 @@ class _EquationBuilder:
         self.model, self.book = model, SymbolTable(MAX_PRODUCTS)
         names = scene_parameters.resolve_names(model.scene, keep)
         values = model.parameters
-        self.kept = {name: self.book.symbol(name, values[name]) for name in names}
-        seeds = list(self.kept.values())
+        self.kept_symbols = {name: self.book.symbol(name, values[name]) for name in names}
+        seeds = list(self.kept_symbols.values())
         known_elements = model.known or {}
         system, _ = seed_derivatives(model.scene, known_elements, names, lambda _, k: seeds[k])
         self.structure, self.p = structure_and_numbers(system, known_elements)
         q, u = (x.tolist() for x in model.initial_state())
-        owners = list(model.layout.owners)
+        owners = list(model.coordinate_layout.owners)
         self.q = [
             self.book.symbol(name, x)
             for name, x in zip(
@@ -136,7 +138,7 @@ class _EquationBuilder:
         indices = dict(structure.inputs)
         for entry, index in indices.items():
             self.p[index] = given[entry]
-        for name, number in self.model.layout.inputs.items():
+        for name, number in self.model.coordinate_layout.inputs.items():
             first_entry = NUMBERS_PER_PIECE * number
             if first_entry not in indices:
                 continue
@@ -148,8 +150,8 @@ class _EquationBuilder:
                 yield full_name, symbol
 
     def equations(self) -> SymbolicEquations:
-        required = self._required()
-        free = self.model.free_speeds
+        required = self._required_efforts()
+        free = self.model.free_speed_indices
         free_accelerations = [self.a[j] for j in free]
         mass = [[factor_of_symbol(required[i], a) for a in free_accelerations] for i in free]
         bias = [[_terms_without(required[i], free_accelerations)] for i in free]
@@ -160,9 +162,14 @@ class _EquationBuilder:
         inputs = {
             name: to_sympy(x) for name, x in self.inputs.items() if to_sympy(x) in used_symbols
         }
-        symbols = (*self.q, *self.u, *self.kept.values(), *(self.inputs[name] for name in inputs))
+        symbols = (
+            *self.q,
+            *self.u,
+            *self.kept_symbols.values(),
+            *(self.inputs[name] for name in inputs),
+        )
         numbers = {to_sympy(x): x.value for x in symbols}
-        layout = self.model.layout
+        layout = self.model.coordinate_layout
         q = zip(self.q, layout.q_names, (x for o in layout.owners for x in o.q_units), strict=True)
         u = zip(self.u, layout.u_names, (x for o in layout.owners for x in o.u_units), strict=True)
         return SymbolicEquations(
@@ -171,10 +178,10 @@ class _EquationBuilder:
             tuple(Motion(to_sympy(x), name, unit) for x, name, unit in u),
             free, tuple(to_sympy(x) for k, x in enumerate(self.a) if k not in free),
             inputs,
-            {name: to_sympy(x) for name, x in self.kept.items()}, numbers,
+            {name: to_sympy(x) for name, x in self.kept_symbols.items()}, numbers,
         )  # fmt: skip
 
-    def _required(self) -> list[Formula]:
+    def _required_efforts(self) -> list[Formula]:
         _, definitions = kernel_store.load_known(kernel_store.required_types(self.model.scene))
         user_specs = {
             key: element.spec for key, element in (self.model.known or {}).items() if element.spec

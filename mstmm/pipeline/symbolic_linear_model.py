@@ -52,7 +52,7 @@ _MAX_ZERO_ACCELERATION = 1e-12
 def symbolic_linear_model(
     linear: LinearEquations, keep: Sequence[str], kernels: Kernels
 ) -> SymbolicLinearModel:
-    """Derive the linear model in SymPy; see `LinearEquations.symbolic`."""
+    """M, C, K, V, W in SymPy; all values but those named in `keep` are inserted as numbers."""
     _require_symbolic(linear)
     names = resolve_kept_names(linear, keep)
     reason = "formula; linearize models of other values"
@@ -60,21 +60,34 @@ def symbolic_linear_model(
     equations = _FormulaEquations(linear, names, kernels)
     writer = SympyWriter()
     symbols = {name: writer.symbol(equations.symbols[name]) for name in keep}
-    m, c, k = map(writer.matrix, equations.counted(equations.second_order()))
-    input_matrices = [equations.pushed(channels) for channels in (linear.controls, linear.others)]
-    v, w = map(writer.matrix, equations.counted(input_matrices))
+    m, c, k = map(writer.matrix, equations.count_terms(equations.second_order()))
+    input_matrices = [
+        equations.input_matrix(channels)
+        for channels in (linear.input_channels, linear.disturbance_channels)
+    ]
+    v, w = map(writer.matrix, equations.count_terms(input_matrices))
     numbers = {
         symbols[name]: kept_formula.value for name, kept_formula in equations.symbols.items()
     }
     return SymbolicLinearModel(
-        m, c, k, v, w, symbols, numbers, linear.coordinates, linear.inputs, linear.disturbances
+        m,
+        c,
+        k,
+        v,
+        w,
+        symbols,
+        numbers,
+        linear.coordinate_names,
+        linear.input_names,
+        linear.disturbance_names,
     )
 
 
 def _require_symbolic(linear: LinearEquations) -> None:
-    if linear.drives:
+    if linear.drive_indices:
         raise SceneError(
-            f"symbolic: the motion of the drive of {linear.driven[0]} is an input, for which there "
+            f"symbolic: the motion of the drive of {linear.prescribed_coordinates[0]} is an "
+            f"input, for which there "
             "is no symbolic column; remove it from the inputs"
         )
     if len(linear) > MAX_COORDINATES:
@@ -82,8 +95,8 @@ def _require_symbolic(linear: LinearEquations) -> None:
             f"symbolic: the scene has {len(linear)} coordinates; the limit is {MAX_COORDINATES}; "
             "use M, C and K of linearize, after with_parameters for other values"
         )
-    if linear.model.packed.releases:
-        names = ", ".join(f'"{name}"' for name in linear.model.packed.releases)
+    if linear.model.packed_scene.releases:
+        names = ", ".join(f'"{name}"' for name in linear.model.packed_scene.releases)
         raise SceneError(
             f"symbolic: hinge {names} is released during the run, which changes the form of the "
             "equations; remove the release"
@@ -97,20 +110,20 @@ class _FormulaEquations:
         self._linear, self._kernels, self._book = linear, kernels, SymbolTable(MAX_PRODUCTS)
         self.symbols: dict[str, Formula] = {}
         model, state = linear.model, linear.state
-        self._known = model.known or {}
+        self._user_elements = model.known or {}
         #: Contribution of a unit of each disturbance input to R, filled in by `second_order`.
         self._inputs: dict[int, list[Formula]] = {
             channel.input: []
-            for channel in (*linear.controls, *linear.others)
+            for channel in (*linear.input_channels, *linear.disturbance_channels)
             if channel.input >= 0
         }
         values = model.parameters
         seeds = [self._symbol(name, values[full]) for full, name in names.parameters.items()]
         self._system, self._frames = seed_derivatives(
-            model.scene, self._known, list(names.parameters), lambda _, k: seeds[k]
+            model.scene, self._user_elements, list(names.parameters), lambda _, k: seeds[k]
         )
         if dry := linear.dry:
-            self._system = replace(self._system, laws=dry.replaced(self._system.laws))
+            self._system = replace(self._system, laws=dry.replace_friction(self._system.laws))
         self._q = [_rounded_formula(x) for x in state.q.tolist()]
         self._u = [formula(x) for x in state.u.tolist()]
         for entries, kept_names in ((self._q, names.coordinates), (self._u, names.speeds)):
@@ -121,16 +134,16 @@ class _FormulaEquations:
         self.symbols[name] = symbol = self._book.symbol(name, value)
         return symbol
 
-    def counted(self, matrices: Sequence[Rows]) -> Sequence[Rows]:
+    def count_terms(self, matrices: Sequence[Rows]) -> Sequence[Rows]:
         """Count the terms of matrices that will be converted, and return the matrices."""
         terms = sum(len(x.terms) for rows in matrices for row in rows for x in row)
-        self._book.count(_PRODUCTS_PER_TERM * terms)
+        self._book.count_products(_PRODUCTS_PER_TERM * terms)
         return matrices
 
     def second_order(self) -> tuple[Rows, Rows, Rows]:
         """Matrices M, C and K."""
         linear = self._linear
-        structure, p = structure_and_numbers(self._system, self._known)
+        structure, p = structure_and_numbers(self._system, self._user_elements)
         input_values = self._system.inputs_at(linear.state.t).tolist()
         indices = dict(structure.inputs)
         for entry, index in indices.items():
@@ -140,25 +153,27 @@ class _FormulaEquations:
             for i in self._inputs
             if NUMBERS_PER_PIECE * i + 1 in indices
         }
-        kernel = fuse_linear(structure, self._kernels, linear.free, list(used_inputs.values()))
+        kernel = fuse_linear(
+            structure, self._kernels, linear.free_speed_indices, list(used_inputs.values())
+        )
         outputs = self._run(kernel, p, self._u, self._accelerations())
         self._inputs |= {
             entry: outputs["P"][k :: len(used_inputs)] for k, entry in enumerate(used_inputs)
         }
         m, c, k = (_rows(outputs[name], len(linear)) for name in "MCK")
-        if linear.turning is None:
+        if linear.rate_matrix is None:
             return m, c, k
-        if not all(x.fixed for x in outputs["N"]):
+        if not all(x.is_constant for x in outputs["N"]):
             raise SceneError(
                 "symbolic: kept numbers affect the relation of coordinates and speeds of a hinge; "
                 "linearize at rest, or leave them numbers"
             )
-        g = [[formula(x) for x in row] for row in linear.turning.tolist()]
+        g = [[formula(x) for x in row] for row in linear.rate_matrix.tolist()]
         return m, _subtract_product(c, m, g), _subtract_product(k, c, g)
 
     def _entry(self, push: Channel, symbol: Formula, required: list[Formula], row: int) -> Formula:
         """Effort on a free speed per unit of a disturbance or input."""
-        speed = self._linear.free[row]
+        speed = self._linear.free_speed_indices[row]
         if push.input >= 0:
             column = self._inputs[push.input]
             return -column[row] if column else formula(0.0)
@@ -170,19 +185,21 @@ class _FormulaEquations:
     def _accelerations(self) -> list[Formula]:
         linear = self._linear
         scale = np.abs(np.linalg.solve(linear.M, np.hstack([linear.K, linear.C]))).max(initial=0)
-        is_zero = np.abs(linear.state.a) <= _MAX_ZERO_ACCELERATION * scale
-        return [formula(x) for x in np.where(is_zero, 0.0, linear.state.a).tolist()]
+        is_zero = np.abs(linear.state.udot) <= _MAX_ZERO_ACCELERATION * scale
+        return [formula(x) for x in np.where(is_zero, 0.0, linear.state.udot).tolist()]
 
-    def pushed(self, pushes: Sequence[Channel]) -> Rows:
+    def input_matrix(self, pushes: Sequence[Channel]) -> Rows:
         """Input matrix V or W, from the efforts of the tree at rest under a symbol per input.
 
         The efforts are proportional to the symbols.
         """
-        n = len(self._linear.free)
+        n = len(self._linear.free_speed_indices)
         if not pushes:
             return [[] for _ in range(n)]
         symbols = [self._book.symbol(channel.name, 1.0) for channel in pushes]
-        structure, p = structure_and_numbers(self._under(pushes, symbols), self._known)
+        structure, p = structure_and_numbers(
+            self._loaded_tree(pushes, symbols), self._user_elements
+        )
         zeros = [formula(0.0)] * len(self._u)
         kernel = fuse_required(structure, self._kernels)
         required = self._run(kernel, p, zeros, zeros)["required"]
@@ -194,7 +211,7 @@ class _FormulaEquations:
             for row in range(n)
         ]
 
-    def _under(self, pushes: Sequence[Channel], symbols: Sequence[Formula]) -> System:
+    def _loaded_tree(self, pushes: Sequence[Channel], symbols: Sequence[Formula]) -> System:
         """Tree whose only gravity and loads are the symbols of `pushes`."""
         gravity: list[Any] = [0.0, 0.0, 0.0]
         loads = []
@@ -206,7 +223,7 @@ class _FormulaEquations:
         return replace(
             self._system, gravity=tuple(gravity), laws=(), forces=(), loads=tuple(loads),
             values=self._values(len(pushes)) if loads else None, drives=None, driven=(),
-            moving=dict(enumerate(symbols)),
+            seeded_numbers=dict(enumerate(symbols)),
         )  # fmt: skip
 
     def _load(self, push: Channel, place: int) -> LoadNumbers:

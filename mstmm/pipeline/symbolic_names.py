@@ -29,7 +29,7 @@ class _Motion:
     """Coordinate or speed: the table for its name, its index, and whether it is free."""
 
     among: dict[int, str]
-    place: int
+    index: int
     free: bool
 
 
@@ -53,7 +53,7 @@ def resolve_kept_names(linear: LinearEquations, keep: Sequence[str]) -> SymbolNa
                     "speed, found one that a drive imposes or that is no integral of a speed; "
                     "leave it a number"
                 )
-            is_duplicate = motion.among.setdefault(motion.place, name) != name
+            is_duplicate = motion.among.setdefault(motion.index, name) != name
         elif name in numbers or f"{name}[0]" in numbers:
             (full_name,) = scene_parameters.resolve_names(linear.model.scene, [name])
             is_duplicate = symbol_names.parameters.setdefault(full_name, name) != name
@@ -72,10 +72,10 @@ def resolve_kept_names(linear: LinearEquations, keep: Sequence[str]) -> SymbolNa
 
 def _motions(linear: LinearEquations, found: SymbolNames) -> Iterator[tuple[str, _Motion]]:
     """Iterate over all coordinates and speeds with their full names."""
-    for slots in linear.model.layout.owners:
+    for slots in linear.model.coordinate_layout.owners:
         for k, name in enumerate(slots.q_names):
-            is_free = slots.straight and slots.u + k in linear.free
+            is_free = slots.rates_are_speeds and slots.u + k in linear.free_speed_indices
             yield f"{slots.name}.{name}", _Motion(found.coordinates, slots.q + k, is_free)
         for k, name in enumerate(slots.u_names):
-            is_free = slots.straight and slots.u + k in linear.free
+            is_free = slots.rates_are_speeds and slots.u + k in linear.free_speed_indices
             yield f"{slots.name}.{name}", _Motion(found.speeds, slots.u + k, is_free)

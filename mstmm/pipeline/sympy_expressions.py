@@ -68,10 +68,10 @@ class SympyWriter:
 
     def _atom(self, atom: Atom) -> sp.Expr:
         if atom not in self._written:
-            self._written[atom] = self._made(atom)
+            self._written[atom] = self._convert_atom(atom)
         return self._written[atom]
 
-    def _made(self, atom: Atom) -> sp.Expr:
+    def _convert_atom(self, atom: Atom) -> sp.Expr:
         if atom.op == "symbol":
             return sp.Symbol(atom.name, real=True)
         if atom.op == "select":
@@ -86,7 +86,7 @@ class SympyWriter:
 
     def _condition(self, formula: Formula) -> sp.Basic:
         """Convert a formula that is used as a condition (true if not zero)."""
-        if formula.fixed:
+        if formula.is_constant:
             return sp.true if formula.value else sp.false
         ((monomial, c), *other_terms) = formula.terms.items()
         ((atom, power), *other_atoms) = monomial

@@ -40,7 +40,7 @@ def tree_edges(model: Model) -> list[TreeEdge]:
 
 def tree_lines(model: Model) -> list[str]:
     """Lines of the tree from the ground outwards: each hinge with the body that it carries."""
-    hinges, cut = tree_edges(model), set(model.loops.cut)
+    hinges, cut = tree_edges(model), set(model.loops.cut_hinges)
     edges_by_body: dict[str, list[TreeEdge]] = {}
     for edge in hinges:
         edges_by_body.setdefault(edge.inboard, []).append(edge)
@@ -67,7 +67,9 @@ def _branches(
 
 def sweep_passes(model: Model) -> list[tuple[Pass, list[str]]]:
     """Passes of the sweep over a tree, each with the bodies in its order."""
-    edges = [edge for edge in _edges_from_root(model) if edge.name not in set(model.loops.cut)]
+    edges = [
+        edge for edge in _edges_from_root(model) if edge.name not in set(model.loops.cut_hinges)
+    ]
     outward_lines = _truncate([f"{j.inboard} → {j.outboard} across {j.name}" for j in edges])
     inward_lines = _truncate(
         [f"{j.outboard} → {j.inboard} across {j.name}" for j in reversed(edges)]

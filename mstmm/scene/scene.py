@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextvars import ContextVar
-from typing import Any
+from typing import Any, ClassVar
 
 from pydantic import ConfigDict, ValidationError, model_validator
 
@@ -18,6 +18,7 @@ from ..errors import SceneError
 from ..ir.element_spec import ElementSpec
 from ..notebook_html import NotebookDisplay
 from ..notebook_html import table as html_table
+from ..public_members import PublicMembers
 from ..risk import Risk, sentences
 from .checks import consistency as checks
 from .checks import couplings, flexible_bodies, user_types
@@ -33,13 +34,22 @@ from .validators.validation_messages import TABLES, build_scene_error, scene_err
 _source: ContextVar[str] = ContextVar("source", default="scene")
 
 
-class Scene(SceneTables, NotebookDisplay):
+class Scene(PublicMembers, SceneTables, NotebookDisplay):
     """Validated description of a multibody system in SI units and radians; frozen.
 
     `gravity` is in m/s^2, inertial axes; `constants` are named numbers.  Lists keep the order of
     the file.  q and u contain the hinge coordinates in the order of `hinge`, then those of the
     chains in the order of `chain`, then the modal coordinates in the order of `beam` and `elastic`.
     """
+
+    member_groups: ClassVar[Mapping[str, str]] = {
+        "Tables": "schema_version gravity allow_unphysical_inertia constants input signal "
+        "body beam elastic hinge chain spring bushing load coupling constraint "
+        "controller event output shape names",
+        "Elements": "bodies hinges summary",
+        "Checks": "risks warnings check_types",
+        "Copies and files": "with_inputs from_data to_toml",
+    }
 
     model_config = ConfigDict(title="mstmm scene")
 
@@ -103,7 +113,7 @@ class Scene(SceneTables, NotebookDisplay):
         """Convert to TOML text with all defaults; loading it gives an equal scene."""
         return to_toml(self)
 
-    def check_against(self, spec: ElementSpec, where: str = "scene") -> None:
+    def check_type(self, spec: ElementSpec, where: str = "scene") -> None:
         """Check every element of a user-defined type against its definition.
 
         Raises SceneError; `where` begins every message.
@@ -137,7 +147,7 @@ class Scene(SceneTables, NotebookDisplay):
         return {table: getattr(self, table) for table in TABLES}
 
     @model_validator(mode="after")
-    def _settle(self) -> Scene:
+    def _resolve_references(self) -> Scene:
         for table in _AUTO_NAMED_TABLES:
             object.__setattr__(self, table, _name_elements(table, getattr(self, table)))
         for table, elements in _tables_with_beam_roots(self).items():

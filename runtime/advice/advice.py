@@ -5,12 +5,13 @@ from __future__ import annotations
 import json
 import textwrap
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from mstmm.argument_validation import require_path
 from mstmm.errors import SceneError
+from mstmm.plain_data import stored_as, to_plain
 from mstmm.scene import Scene
 
 from ..chart.chart_points import Setting
@@ -29,34 +30,34 @@ class BodyAdvice:
 
     Attributes:
         name: name of the body.
-        given: model of the body in the given scene.
-        choice: smallest sufficient model.
+        given_model: model of the body in the given scene.
+        model: smallest sufficient model.
         error: error of this choice alone, with the richest models of all other bodies; None if
             unknown.
-        saving: CPU time of the richest model over that with this choice alone.
+        speedup: CPU time of the richest model over that with this choice alone.
         reason: reason of the choice, with numbers.
         evidence: error estimates from a run with one-way coupling; None if there are none.
-        split: error of one floating frame, where its estimate exceeds the target error and the beam
-            is not split; else None.
+        frame_error: error of one floating frame, where its estimate exceeds the target error and
+            the beam is not split; else None.
     """
 
     name: str
-    given: BodyModel
-    choice: BodyModel
+    given_model: BodyModel
+    model: BodyModel
     error: float | None
-    saving: float | None
+    speedup: float | None
     reason: str
     evidence: ErrorPrediction | None = None
-    split: float | None = None
+    frame_error: float | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values."""
         return {
-            "name": self.name, "given": _plain_model(self.given),
-            "advised": _plain_model(self.choice),
-            "error": self.error, "saving": self.saving, "reason": self.reason,
+            "name": self.name, "given": _plain_model(self.given_model),
+            "advised": _plain_model(self.model),
+            "error": self.error, "saving": self.speedup, "reason": self.reason,
             "evidence": None if self.evidence is None else self.evidence.to_dict(),
-            "split": self.split,
+            "split": self.frame_error,
         }  # fmt: skip
 
 
@@ -68,13 +69,13 @@ class TriedModel:
         name: description of the model.
         error: error relative to the richest model; None if the run failed.
         cpu_s: CPU time at the tolerance of the comparison, s.
-        why: reason why there is no error, else "".
+        reason: reason why there is no error, else "".
     """
 
     name: str
     error: float | None
     cpu_s: float
-    why: str
+    reason: str = field(metadata=stored_as("why"))
 
 
 @dataclass(frozen=True)
@@ -82,14 +83,14 @@ class Advice:
     """Smallest sufficient model found for a target error.  Made by `mstmm.advise`.
 
     Attributes:
-        asked: target error of `measure`, in `unit` ("1": relative, see `scaling`).
+        target_error: target error of `measure`, in `unit` ("1": relative, see `scaling`).
         measure, unit, scaling: compared quantity, its unit, and what it is divided by.
         t_end: end of the run that the advice is for, s.
-        compared: description of the time span of the comparison.
-        whole: whether this is the whole run.
+        comparison_text: description of the time span of the comparison.
+        covers_whole_run: whether this is the whole run.
         reference_error: difference of two runs of the richest model.
         bodies: advice for each flexible body.
-        changes: changes of hinges, springs, beams and welded bodies, a sentence each.
+        other_changes: changes of hinges, springs, beams and welded bodies, a sentence each.
         setting: method and tolerance or step.
         error: error of the advised model with this setting, relative to the richest model.
         cpu_s: CPU time of that run over the compared time span, s.
@@ -98,32 +99,33 @@ class Advice:
         setting_saving: CPU time with the default method and tolerance over that with the advised
             ones, on the reduced scene; None as above.
         scene: reduced scene.
-        names: former name of a body or end, such as "arm.tip" -> its name in the reduced scene.
-        parts: beam of the reduced scene -> beam of the given scene that it is a part of.
+        renamed_references: former name of a body or end, such as "arm.tip" -> its name in the
+            reduced scene.
+        beam_parts: beam of the reduced scene -> beam of the given scene that it is a part of.
         notes: limits of the advice, a sentence each.
-        tried: all models that were tried.
+        tried_models: all models that were tried.
     """
 
-    asked: float
+    target_error: float
     measure: str
     unit: str
     scaling: str
     t_end: float
-    compared: str
-    whole: bool
+    comparison_text: str
+    covers_whole_run: bool
     reference_error: float
     bodies: tuple[BodyAdvice, ...]
-    changes: tuple[str, ...]
+    other_changes: tuple[str, ...]
     setting: Setting
     error: float
     cpu_s: float
     model_saving: float | None
     setting_saving: float | None
     scene: Scene
-    names: Mapping[str, str]
-    parts: Mapping[str, str]
+    renamed_references: Mapping[str, str]
+    beam_parts: Mapping[str, str]
     notes: tuple[str, ...]
-    tried: tuple[TriedModel, ...]
+    tried_models: tuple[TriedModel, ...]
 
     @property
     def method(self) -> str:
@@ -136,32 +138,34 @@ class Advice:
         return self.setting.options
 
     @property
-    def in_words(self) -> str:
+    def scaling_text(self) -> str:
         """Scaling of relative errors, in brackets; "" for errors with a unit."""
         return f" ({self.scaling})" if self.unit == "1" and self.scaling else ""
 
     @property
-    def reduced(self) -> bool:
+    def is_reduced(self) -> bool:
         """Whether the advised scene differs from the given one."""
-        return bool(self.changes) or any(body.choice != body.given for body in self.bodies)
+        return bool(self.other_changes) or any(
+            body.model != body.given_model for body in self.bodies
+        )
 
-    def renamed(self, quantity: str) -> str:
+    def reduced_name(self, quantity: str) -> str:
         """Name of a body, end or quantity in the reduced scene."""
-        return rename_reference(quantity, self.names)
+        return rename_reference(quantity, self.renamed_references)
 
     def to_dict(self) -> dict[str, Any]:
         """All data as plain values."""
         return {
-            "error_asked": self.asked, "of": self.measure, "unit": self.unit,
-            "scaling": self.scaling, "t_end": self.t_end, "compared": self.compared,
-            "whole": self.whole, "reference_error": self.reference_error,
-            "bodies": [body.to_dict() for body in self.bodies], "changes": list(self.changes),
+            "error_asked": self.target_error, "of": self.measure, "unit": self.unit,
+            "scaling": self.scaling, "t_end": self.t_end, "compared": self.comparison_text,
+            "whole": self.covers_whole_run, "reference_error": self.reference_error,
+            "bodies": [body.to_dict() for body in self.bodies], "changes": list(self.other_changes),
             "method": self.method, "setting": self.setting.numbers, "error": self.error,
             "cpu_s": self.cpu_s, "model_saving": self.model_saving,
-            "setting_saving": self.setting_saving, "reduced": self.reduced,
-            "scene": self.scene.to_toml(), "names": dict(self.names), "parts": dict(self.parts),
-            "notes": list(self.notes),
-            "tried": [asdict(tried) for tried in self.tried],
+            "setting_saving": self.setting_saving, "reduced": self.is_reduced,
+            "scene": self.scene.to_toml(), "names": dict(self.renamed_references),
+            "parts": dict(self.beam_parts), "notes": list(self.notes),
+            "tried": to_plain(self.tried_models),
         }  # fmt: skip
 
     def to_json(self) -> str:
@@ -173,20 +177,20 @@ class Advice:
         unit = "" if self.unit == "1" else f" {self.unit}"
         options = " ".join(f"--{key} {value:g}" for key, value in self.setting.numbers.items())
         lines = [
-            f"Reduced for an error of {self.asked:g}{unit} of {self.measure}{self.in_words}; its "
-            f"error is {self.error:.1e} over {self.compared}.",
-            f"Command: mstmm simulate FILE --t-end {self.t_end:g} --method {self.method} "
-            f"{options}",
+            f"Reduced for an error of {self.target_error:g}{unit} of "
+            f"{self.measure}{self.scaling_text}; its "
+            f"error is {self.error:.1e} over {self.comparison_text}.",
+            f"Command: mstmm simulate FILE --t-end {self.t_end:g} --method {self.method} {options}",
             *(
-                f"{body.name}: {body.choice} (was {body.given}). {body.reason}"
+                f"{body.name}: {body.model} (was {body.given_model}). {body.reason}"
                 for body in self.bodies
             ),
-            *self.changes, *self.notes,
+            *self.other_changes, *self.notes,
         ]  # fmt: skip
         comment = [part for line in lines for part in textwrap.wrap(line, _WIDTH)]
         return "\n".join(f"# {line}" for line in comment) + "\n\n" + self.scene.to_toml()
 
-    def write(self, path: str | Path) -> Path:
+    def save_scene(self, path: str | Path) -> Path:
         """Write the reduced scene to a .toml file; SceneError for another file name extension."""
         file = require_path("scene", path)
         if file.suffix != ".toml":

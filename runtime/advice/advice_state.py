@@ -11,7 +11,7 @@ import numpy as np
 from mstmm.errors import MstmmError
 
 from ..chart.chart_points import Setting
-from ..chart.error_measure import Places
+from ..chart.error_measure import PositionMeasure
 from ..chart.model_levels import with_model_level
 from ..chart.time_budget import Budget, OutOfTime
 from ..chart.trial_run import Runs
@@ -52,55 +52,55 @@ class AdviceState:
 
     Attributes:
         scene: given scene.
-        asked: validated arguments.
+        request: validated arguments.
         budget: time limit.
         compile: function that compiles a scene.
-        tell: callback with a sentence before every run.
+        report: callback with a sentence before every run.
         measure: error measure.
         length: length of the scene, m.
         size: size of the motion, in the unit of errors.
-        bench: runner of trial models.
-        whole: body -> its richest model in the scene, without splitting.
+        runner: runner of trial models.
+        unsplit_models: body -> its richest model in the scene, without splitting.
         bodies: flexible bodies of the scene that is reduced.
         notes: limits of the advice, a sentence each.
-        told: name of a model -> sentences on the changes of its hinges and beams.
+        change_texts: name of a model -> sentences on the changes of its hinges and beams.
         parts: part of a split beam -> beam of the given scene.
-        unseen: estimated error of the reference itself, by the number of its parts.
+        reference_error: estimated error of the reference itself, by the number of its parts.
         split_error: measured error of one frame where beams are not split; None if not measured.
         skipped: models and changes that were skipped for lack of time.
     """
 
     scene: Scene
-    asked: Request
+    request: Request
     budget: Budget
     compile: Compile
-    tell: Report
+    report: Report
     measure: Renaming = field(init=False)
     length: float = 1.0
     size: float = 1.0
-    bench: TrialRunner = field(init=False)
-    whole: dict[str, BodyModel] = field(default_factory=dict)
+    runner: TrialRunner = field(init=False)
+    unsplit_models: dict[str, BodyModel] = field(default_factory=dict)
     bodies: Bodies = field(init=False)
     notes: list[str] = field(default_factory=list)
-    told: dict[str, tuple[str, ...]] = field(default_factory=lambda: {RICHEST: ()})
+    change_texts: dict[str, tuple[str, ...]] = field(default_factory=lambda: {RICHEST: ()})
     parts: Mapping[str, str] = field(default_factory=dict)
-    unseen: float = 0.0
+    reference_error: float = 0.0
     split_error: float | None = None
     skipped: list[str] = field(default_factory=list)
 
-    def least(self, scene: Scene) -> Result | None:
+    def run_one_way(self, scene: Scene) -> Result | None:
         """Run with one-way coupling of all flexible bodies; None if it fails."""
-        self.tell("one-way coupling, for error estimates")
-        times = np.linspace(0.0, self.asked.t_end, self.asked.samples)
-        runs = Runs(self.asked.t_end, times, self.budget)
-        setting = Setting(AUTO, "one-way", initial_rtol(self.asked.error))
+        self.report("one-way coupling, for error estimates")
+        times = np.linspace(0.0, self.request.t_end, self.request.samples)
+        runs = Runs(self.request.t_end, times, self.budget)
+        setting = Setting(AUTO, "one-way", initial_rtol(self.request.error))
         try:
             model = self.compile(with_model_level(scene, "one-way"))
-            return runs.simulate(model, setting, _ONE_WAY_BUDGET * self.budget.left())[0]
+            return runs.simulate(model, setting, _ONE_WAY_BUDGET * self.budget.remaining())[0]
         except (OutOfTime, MstmmError, ArithmeticError, np.linalg.LinAlgError):
             return None
 
-    def known(
+    def error_predictions(
         self, one_way: Result | None, richest: Model
     ) -> tuple[dict[str, ErrorPrediction], str]:
         """Error estimates by body from a run with one-way coupling, and why there are none, or "".
@@ -108,49 +108,49 @@ class AdviceState:
         Without such a run, they come from a run of the richest model.
         """
         evidence, reason = predict_errors(one_way, self.length)
-        if evidence or not richest.flexible:
+        if evidence or not richest.flexible_bodies:
             return evidence, reason
-        setting = Setting(AUTO, RICHEST, self.bench.rtol)
-        limit = _ONE_WAY_BUDGET * self.budget.left()
+        setting = Setting(AUTO, RICHEST, self.runner.rtol)
+        limit = _ONE_WAY_BUDGET * self.budget.remaining()
         try:
-            result, _ = self.bench.runs.simulate(richest, setting, limit)
+            result, _ = self.runner.runs.simulate(richest, setting, limit)
         except (OutOfTime, MstmmError, ArithmeticError, np.linalg.LinAlgError) as problem:
             return {}, reason or str(problem)
         return predict_errors(result, self.length)
 
     @property
-    def in_measure(self) -> float:
+    def error_per_metre(self) -> float:
         """Factor from a displacement in m to the unit of errors."""
-        if isinstance(self.measure.inner, Places):
+        if isinstance(self.measure.measure, PositionMeasure):
             return 1.0 / self.length
         return 1.0 if self.measure.unit == "m" else self.size / self.length
 
     @property
-    def enough(self) -> float:
+    def error_budget(self) -> float:
         """Largest sufficient error of a model relative to the reference."""
-        return _MODEL_ERROR * self.beside_unseen
+        return _MODEL_ERROR * self.remaining_target
 
     @property
-    def beside_unseen(self) -> float:
+    def remaining_target(self) -> float:
         """Target error less the error of the reference, if enough of it remains."""
-        remainder = self.asked.error - self.unseen
-        return remainder if remainder > _MIN_REMAINDER * self.asked.error else self.asked.error
+        remainder = self.request.error - self.reference_error
+        return remainder if remainder > _MIN_REMAINDER * self.request.error else self.request.error
 
     @property
-    def part(self) -> float:
+    def relative_target(self) -> float:
         """Target error relative to the size of the motion."""
         return (
-            self.asked.error
+            self.request.error
             if self.measure.unit in ("1", "rad")
-            else (self.asked.error / self.size)
+            else (self.request.error / self.size)
         )
 
-    def steep(self, prediction: ErrorPrediction | None) -> bool:
+    def may_need_splitting(self, prediction: ErrorPrediction | None) -> bool:
         """Whether one floating frame may not suffice for a body."""
         if prediction is None:
             return False
         return (
-            prediction.frame_error * self.in_measure > self.asked.error
+            prediction.frame_error * self.error_per_metre > self.request.error
             or prediction.slope > MAX_SLOPE
         )
 
@@ -160,7 +160,7 @@ def motion_size(measure: Measure, result: Result | None) -> float:
     if result is None or not result.is_comparable:
         return 1.0
     numbers = measure.read(result)
-    measure.scale_by(numbers)
+    measure.set_scales(numbers)
     start = np.broadcast_to(numbers[:1], numbers.shape)
-    distance = float(measure.apart(numbers, start).max(initial=0.0))
+    distance = float(measure.distance(numbers, start).max(initial=0.0))
     return distance if np.isfinite(distance) and distance > 0 else 1.0

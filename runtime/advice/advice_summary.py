@@ -40,7 +40,7 @@ def build_advice(
     base: str,
 ) -> Advice:
     """Build the advice; `base` is the name of the model before the search over bodies."""
-    request, bench = state.asked, state.bench
+    request, bench = state.request, state.runner
     model_saving, setting_saving = _savings(state, selected)
     given = _given_scene_if_better(state, selected, model_saving)
     if given is not None:
@@ -51,7 +51,7 @@ def build_advice(
             _body_advice(state, name, choice, evidence.get(name), search)
             for name, choice in {**_undeformed_bodies(state), **choices}.items()
         )
-    changes = state.told.get(selected.tried.name, state.told[base])
+    changes = state.change_texts.get(selected.trial.name, state.change_texts[base])
     if not bodies:
         state.notes.append("there is nothing to reduce in the bodies: none of them is flexible")
     missing = [*state.skipped, *(f"model {name}" for name in bench.late)]
@@ -65,18 +65,20 @@ def build_advice(
     assert error is not None and selected.point.cpu_s is not None
     return Advice(
         request.error, state.measure.name, state.measure.unit, state.measure.scaling, request.t_end,
-        _comparison_text(state, selected), bench.span.whole, max(bench.floor, state.unseen), bodies,
-        changes, selected.point.setting, error * growth + state.unseen, selected.point.cpu_s,
-        model_saving, setting_saving,
-        with_available_outputs(selected.tried.scene, state.compile),
-        dict(state.measure.names_in(selected.tried.running)), dict(state.parts),
+        _comparison_text(state, selected), bench.span.is_whole_run,
+        max(bench.floor, state.reference_error), bodies, changes, selected.point.setting,
+        error * growth + state.reference_error, selected.point.cpu_s, model_saving, setting_saving,
+        with_available_outputs(selected.trial.scene, state.compile),
+        dict(state.measure.names_of(selected.trial.compiled_model)), dict(state.parts),
         tuple(state.notes),
         tuple(
             TriedModel(
-                tried.name, tried.error if math.isfinite(tried.error) else None, tried.cpu_s,
-                tried.why,
+                tried.name,
+                tried.error if math.isfinite(tried.error) else None,
+                tried.cpu_s,
+                tried.reason,
             )
-            for tried in bench.all
+            for tried in bench.results
             if math.isfinite(tried.cpu_s)
         ),
     )  # fmt: skip
@@ -86,26 +88,26 @@ def _given_scene_if_better(
     state: AdviceState, selected: SelectedSetting, saving: float | None
 ) -> SelectedSetting | None:
     """Setting of the given scene if the reduced model is slower and less accurate, else None."""
-    bench, setting = state.bench, selected.point.setting
-    scene = bench.tried(AS_GIVEN, state.scene, {})
+    bench, setting = state.runner, selected.point.setting
+    scene = bench.run_trial(AS_GIVEN, state.scene, {})
     if saving is None or saving >= 1 or scene.model is None:
         return None
-    if scene.error >= selected.tried.error or scene.error > state.enough:
+    if scene.error >= selected.trial.error or scene.error > state.error_budget:
         return None
-    if selected.whole:
-        given = whole_run_tolerance(scene, state, state.beside_unseen - scene.error)
+    if selected.covers_whole_run:
+        given = whole_run_tolerance(scene, state, state.remaining_target - scene.error)
     else:
-        trial = bench.runs.trial(scene.model, setting, bench.measure, bench.budget.left())
+        trial = bench.runs.trial(scene.model, setting, bench.measure, bench.budget.remaining())
         error = max_error(trial, bench.reference, bench.measure)
-        if isinstance(error, str) or error * bench.span.growth > state.beside_unseen:
+        if isinstance(error, str) or error * bench.span.growth > state.remaining_target:
             return None
         given = SelectedSetting(
             scene, Point(replace(setting, model=AS_GIVEN), error, trial.cpu_s, 1)
         )
     if given is not None:
-        state.told[AS_GIVEN] = ()
+        state.change_texts[AS_GIVEN] = ()
         state.notes.append(
-            f"the scene is not reduced: a smaller model has an error of {selected.tried.error:.1e} "
+            f"the scene is not reduced: a smaller model has an error of {selected.trial.error:.1e} "
             f"and takes {1 / saving:.2f} times the time of the scene as given, whose error is "
             f"{scene.error:.1e}"
         )
@@ -116,7 +118,7 @@ def _bodies_as_given(
     state: AdviceState, evidence: Mapping[str, ErrorPrediction]
 ) -> tuple[BodyAdvice, ...]:
     """Advice to keep every flexible body as it is in the scene."""
-    models = {name: _given_model(state, name) for name in state.whole}
+    models = {name: _given_model(state, name) for name in state.unsplit_models}
     reason = "stays as it is: a smaller model of the scene is slower and less accurate"
     return tuple(
         BodyAdvice(name, model, model, None, None, reason, evidence.get(name))
@@ -126,9 +128,9 @@ def _bodies_as_given(
 
 def _comparison_text(state: AdviceState, selected: SelectedSetting) -> str:
     """Description of the time span over which errors were measured."""
-    bench, text = state.bench, str(state.bench.span)
-    if selected.whole:
-        text += f" (the integration over all of its {state.asked.t_end:g} s)"
+    bench, text = state.runner, str(state.runner.span)
+    if selected.covers_whole_run:
+        text += f" (the integration over all of its {state.request.t_end:g} s)"
     ended = bench.reference.ended
     return f"{text}, up to its end at {bench.reference.t[-1]:.4g} s: {ended}" if ended else text
 
@@ -143,18 +145,18 @@ def _body_advice(
     """Advice for one body; its choice alone is tried with the richest models of all others."""
     richest_choices = state.bodies.richest
     is_richest = choice == richest_choices.get(name, choice)
-    error, saving = (state.bench.floor, 1.0) if is_richest else (None, None)
-    if not is_richest and state.budget.left():
-        single = search.tried({**richest_choices, name: choice})
+    error, saving = (state.runner.floor, 1.0) if is_richest else (None, None)
+    if not is_richest and state.budget.remaining():
+        single = search.try_choices({**richest_choices, name: choice})
         if math.isfinite(single.error):
-            richest_model = search.tried(richest_choices)
+            richest_model = search.try_choices(richest_choices)
             error, saving = single.error, richest_model.cpu_s / single.cpu_s
     split = None
-    if prediction is not None and state.steep(prediction) and name not in state.parts:
-        split = state.split_error or prediction.frame_error * state.in_measure
+    if prediction is not None and state.may_need_splitting(prediction) and name not in state.parts:
+        split = state.split_error or prediction.frame_error * state.error_per_metre
     is_part = name in state.parts
-    richest = richest_choices.get(name, choice) if is_part else state.whole[name]
-    reason = choice_reason(choice, richest, prediction, state.in_measure, state.asked.error)
+    richest = richest_choices.get(name, choice) if is_part else state.unsplit_models[name]
+    reason = choice_reason(choice, richest, prediction, state.error_per_metre, state.request.error)
     if split is not None and prediction is not None:
         reason += f"; its slope is {prediction.slope:.2g}, for which one floating frame "
         reason += (
@@ -171,7 +173,7 @@ def _undeformed_bodies(state: AdviceState) -> Choices:
     """Rigid models of the bodies that do not deform in the plane of motion."""
     return {
         name: BodyModel(RIGID)
-        for name in state.whole
+        for name in state.unsplit_models
         if name not in state.bodies.richest and name not in state.parts.values()
     }
 
@@ -181,7 +183,7 @@ def _given_model(state: AdviceState, name: str) -> BodyModel:
     bodies: tuple[Beam | Elastic, ...] = (*state.scene.beam, *state.scene.elastic)
     whole = state.parts.get(name, name)
     given = next(body for body in bodies if body.name == whole)
-    return given_body_model(given, state.whole[whole])
+    return given_body_model(given, state.unsplit_models[whole])
 
 
 def _savings(state: AdviceState, selected: SelectedSetting) -> tuple[float | None, float | None]:
@@ -190,11 +192,11 @@ def _savings(state: AdviceState, selected: SelectedSetting) -> tuple[float | Non
     The first compares the given scene with the advised one at the same tolerance, the second the
     default setting with the advised one on the advised scene.
     """
-    setting, tried, rounds = selected.point.setting, selected.tried, state.asked.rounds
+    setting, tried, rounds = selected.point.setting, selected.trial, state.request.rounds
     rtol = RTOL if setting.fixed else setting.value
     same_setting = Setting(AUTO, tried.name, rtol)
     default_setting = Setting(METHOD, tried.name, RTOL)
-    given = state.bench.tried(AS_GIVEN, state.scene, {})
+    given = state.runner.run_trial(AS_GIVEN, state.scene, {})
     savings: list[float | None] = []
     for model, before, after in (
         (given, same_setting, same_setting), (tried, default_setting, setting),
@@ -203,7 +205,7 @@ def _savings(state: AdviceState, selected: SelectedSetting) -> tuple[float | Non
         if model.scene == tried.scene and before == after:
             saving = 1.0
         elif model.model is not None:
-            times = compare_cpu_times(model, before, tried, after, state.bench, rounds)
+            times = compare_cpu_times(model, before, tried, after, state.runner, rounds)
             saving = None if times is None else times[0] / times[1]
         savings.append(saving)
     return savings[0], savings[1]

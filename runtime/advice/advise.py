@@ -67,21 +67,21 @@ def make_advice(
     start = richest.simulate(0.0, method="dop853")
     state.measure = Renaming(select_measure(richest, start, request.of, True))
     state.length = scene_length_with_ends(richest)
-    one_way = state.least(state.scene)
+    one_way = state.run_one_way(state.scene)
     state.size = motion_size(state.measure, one_way)
     predictions = predict_errors(one_way, state.length)[0]
-    state.bench, base = _make_runner(state, top, richest, predictions, report_status)
-    evidence, reason = state.known(one_way, richest)
+    state.runner, base = _make_runner(state, top, richest, predictions, report_status)
+    evidence, reason = state.error_predictions(one_way, richest)
     if reason:
         state.notes.append(f"no error estimates for the flexible bodies: {reason}")
     base = reduce_to_plane(state, top, richest, base)
-    q = state.bench.reference.q
-    state.whole = Bodies(top.scene).richest
+    q = state.runner.reference.q
+    state.unsplit_models = Bodies(top.scene).richest
     base, evidence = subdivide_beams(state, base, evidence)
     changes = rigid_hinge_changes(base.scene, richest, q, state.length)
     max_error = _RIGID_ERROR * request.error
     base = reduce_by_halves(state, base, "rigid", changes, max_error, cheap=True)
-    state.bench.names = state.measure.names_in(base.running)
+    state.runner.names = state.measure.names_of(base.compiled_model)
     return _reduce_bodies(state, base, evidence)
 
 
@@ -93,20 +93,20 @@ def _make_runner(
     report_status: Report,
 ) -> tuple[TrialRunner, TrialResult]:
     """Runner of trial models with its reference, over the whole run or a window of it."""
-    request = state.asked
-    rtol = initial_rtol(state.part)
+    request = state.request
+    rtol = initial_rtol(state.relative_target)
     span = choose_window(model, request.t_end, request.samples, state.budget, state.measure, rtol)
-    if not span.whole:
+    if not span.is_whole_run:
         rise = max((prediction.rise(span.t_end) for prediction in evidence.values()), default=1.0)
         span = replace(span, rise=min(rise, _MAX_RISE))
     runner = TrialRunner(
-        span, request.samples, state.budget, state.measure, state.compile, state.tell
+        span, request.samples, state.budget, state.measure, state.compile, state.report
     )
-    richest = runner.refer_to(top.scene, model, RICHEST, request.error, state.part)
+    richest = runner.make_reference(top.scene, model, RICHEST, request.error, state.relative_target)
     report_status(
         f"models are compared over {span}; error of the reference about {richest.error:.1e}"
     )
-    if not span.whole:
+    if not span.is_whole_run:
         state.notes.append(
             "motion after the window was not simulated: plane, hinges, springs and dampers stay as "
             "they are; give a larger --budget to have them examined"
@@ -120,22 +120,22 @@ def _reduce_bodies(
     """Advice for a scene whose plane, beams and rigid hinges have been decided."""
     state.bodies = Bodies(base.scene)
     search = ModelSearch(
-        state.bodies, state.bench, evidence, state.enough, state.in_measure,
-        lambda: state.budget.left(SEARCH) > 0,
+        state.bodies, state.runner, evidence, state.error_budget, state.error_per_metre,
+        lambda: state.budget.remaining(SEARCH) > 0,
     )  # fmt: skip
     for name in (RICHEST, base.name):
-        search.made[name] = state.bodies.richest
+        search.choices_by_name[name] = state.bodies.richest
     choices, best = search.run() if state.bodies.richest else ({}, base)
     state.skipped += [f"smaller models of body {name}" for name in search.skipped]
-    state.told.setdefault(best.name, state.told[base.name])
-    max_error = max(_OMISSION_ERROR * state.asked.error, _OMISSION_GROWTH * best.error)
+    state.change_texts.setdefault(best.name, state.change_texts[base.name])
+    max_error = max(_OMISSION_ERROR * state.request.error, _OMISSION_GROWTH * best.error)
     best = reduce_by_halves(
         state, best, "without", omission_changes(best.scene), max_error, cheap=False
     )
     best = merge_welded(state, best, max_error)
-    search.made.setdefault(best.name, choices)
+    search.choices_by_name.setdefault(best.name, choices)
     selected = _select_setting(state, best, choices, search)
-    choices = search.made.get(selected.tried.name, choices)
+    choices = search.choices_by_name.get(selected.trial.name, choices)
     return build_advice(state, choices, evidence, selected, search, base.name)
 
 
@@ -147,19 +147,19 @@ def _select_setting(
     A more accurate model leaves more of the target error to the integration, and may be cheaper in
     total.
     """
-    available = state.beside_unseen
+    available = state.remaining_target
     if best.error > _ACCURATE * available and choices != state.bodies.richest:
-        search.tried(search.richer(choices))
+        search.try_choices(search.richer(choices))
     others = sorted(
         (
             tried
-            for tried in state.bench.all
-            if search.made.get(tried.name, choices) != choices
+            for tried in state.runner.results
+            if search.choices_by_name.get(tried.name, choices) != choices
             and _may_be_cheapest(state, tried, best)
         ),
         key=lambda tried: tried.cpu_s,
     )
-    if not state.bench.span.whole:
+    if not state.runner.span.is_whole_run:
         selected = whole_run_tolerance(best, state, _TOTAL_ERROR * available - best.error)
         if selected is not None:
             return selected
@@ -168,18 +168,23 @@ def _select_setting(
             "extrapolated"
         )
     finalists = [best, *others][:_MAX_FINALISTS]
-    seconds = max(_METHOD_BUDGET * state.asked.budget, state.budget.left())
-    max_error, growth = _TOTAL_ERROR * available, state.bench.span.growth
+    seconds = max(_METHOD_BUDGET * state.request.budget, state.budget.remaining())
+    max_error, growth = _TOTAL_ERROR * available, state.runner.span.growth
     try:
         return cheapest_setting(
-            finalists, state.bench, max_error / growth, state.asked.of, state.asked.rounds, seconds
+            finalists,
+            state.runner,
+            max_error / growth,
+            state.request.of,
+            state.request.rounds,
+            seconds,
         )
     except NumericalFailure:  # keep the setting of the trial runs
-        setting = Setting(AUTO, best.name, state.bench.rtol)
+        setting = Setting(AUTO, best.name, state.runner.rtol)
         return SelectedSetting(best, Point(setting, best.error / growth, best.cpu_s, 1))
 
 
 def _may_be_cheapest(state: AdviceState, tried: TrialResult, best: TrialResult) -> bool:
-    is_accurate = tried.error <= _ACCURATE * state.asked.error
+    is_accurate = tried.error <= _ACCURATE * state.request.error
     factor = _ACCURATE_TIME_FACTOR if is_accurate else _TIME_FACTOR
-    return tried.error <= state.enough and tried.cpu_s <= factor * best.cpu_s
+    return tried.error <= state.error_budget and tried.cpu_s <= factor * best.cpu_s

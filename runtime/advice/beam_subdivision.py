@@ -38,7 +38,9 @@ def subdivide_beams(
 
     They are halved until the result hardly changes; the finest split becomes the reference.
     """
-    steep = {beam.name for beam in base.scene.beam if state.steep(evidence.get(beam.name))}
+    steep = {
+        beam.name for beam in base.scene.beam if state.may_need_splitting(evidence.get(beam.name))
+    }
     steep -= {beam.name for beam in base.scene.beam if split_obstacle(beam)}
     if not steep:
         return base, evidence
@@ -50,11 +52,11 @@ def subdivide_beams(
         return base, evidence
     if split.scene is whole:
         state.split_error = change if math.isfinite(change) else None
-        state.unseen = 0.0
+        state.reference_error = 0.0
         return base, evidence
     remaining = change / _ERROR_REDUCTION
-    state.unseen += remaining
-    if change > _MAX_CHANGE * state.asked.error:
+    state.reference_error += remaining
+    if change > _MAX_CHANGE * state.request.error:
         state.notes.append(
             f"the last halving of beams still changed the result by {change:.1e}; the error "
             f"includes an estimated remainder of {remaining:.1e}"
@@ -71,11 +73,11 @@ def _prepare_splitting(
     """
     scene, changes = _splittable_scene(base.scene, steep, evidence)
     if not changes:
-        return scene, state.bench.finer(scene, state.bench.names, base.name), ()
-    run = state.bench.finer(scene, state.bench.names, "splittable beams")
-    error = math.inf if run.numbers is None else state.bench.apart(state.bench.reference, run)
-    if error <= _PREPARATION_ERROR * state.asked.error:
-        state.unseen = error
+        return scene, state.runner.finer(scene, state.runner.names, base.name), ()
+    run = state.runner.finer(scene, state.runner.names, "splittable beams")
+    error = math.inf if run.numbers is None else state.runner.distance(state.runner.reference, run)
+    if error <= _PREPARATION_ERROR * state.request.error:
+        state.reference_error = error
         sentences = (
             f'beam "{name}": {change}, which changes the result by {error:.1e}'
             for name, change in changes.items()
@@ -87,7 +89,7 @@ def _prepare_splitting(
         for name, change in changes.items()
     ]
     steep -= {*changes}
-    return base.scene, state.bench.finer(base.scene, state.bench.names, base.name), ()
+    return base.scene, state.runner.finer(base.scene, state.runner.names, base.name), ()
 
 
 def _splittable_scene(
@@ -115,12 +117,12 @@ def _refine_parts(
     split, change = SplitScene(whole, {}, {}), math.inf
     for count in _COUNTS if names else ():
         parts = split_beams(whole, names, count)
-        finer = state.bench.finer(parts.scene, parts.names, f"beams in {count} parts")
+        finer = state.runner.finer(parts.scene, parts.names, f"beams in {count} parts")
         if finer.numbers is None:
             state.notes.append(f"beams in {count} parts could not be simulated: {finer.failure}")
             break
-        change = state.bench.apart(run, finer)
-        if change <= _MAX_CHANGE * state.asked.error:
+        change = state.runner.distance(run, finer)
+        if change <= _MAX_CHANGE * state.request.error:
             return split, finer, change
         split, run = parts, finer
     return split, run, change
@@ -138,19 +140,19 @@ def _compare_with_parts(
     `reference` is a run with as many parts or more.
     """
     state.parts = split.parts
-    state.whole = {**Bodies(split.scene).richest, **state.whole}
-    single_frame_error = state.bench.apart(state.bench.reference, reference)
-    state.bench.refer_again(reference, split.names)
-    tried = state.bench.tried("beams in parts", split.scene)
+    state.unsplit_models = {**Bodies(split.scene).richest, **state.unsplit_models}
+    single_frame_error = state.runner.distance(state.runner.reference, reference)
+    state.runner.use_as_reference(reference, split.names)
+    tried = state.runner.run_trial("beams in parts", split.scene)
     parts_by_beam: dict[str, list[str]] = {}
     for part, beam in split.parts.items():
         parts_by_beam.setdefault(beam, []).append(part)
-    state.told[tried.name] = (*state.told[base.name], *changes, *(
+    state.change_texts[tried.name] = (*state.change_texts[base.name], *changes, *(
         f'beam "{beam}": {len(parts)} welded beams ({", ".join(parts)}) with a frame each; with '
         f"one frame its error is {single_frame_error:.1e}" + _renamed_ends(beam, split.names)
         for beam, parts in parts_by_beam.items()
     ))  # fmt: skip
-    evidence, reason = state.known(state.least(split.scene), tried.running)
+    evidence, reason = state.error_predictions(state.run_one_way(split.scene), tried.compiled_model)
     if reason:
         state.notes.append(f"no error estimates for the parts of beams: {reason}")
     return tried, evidence

@@ -34,16 +34,16 @@ class BodyModel:
     shapes: tuple[tuple[str, int], ...] = ()
 
     @property
-    def coupled(self) -> bool:
+    def is_coupled(self) -> bool:
         """Whether the body is coupled with the motion of the hinges."""
         return self.level in (LINEAR, STIFFENED)
 
     @property
     def total(self) -> int:
         """Number of shapes that are integrated in a run."""
-        return sum(count for _, count in self.shapes) if self.coupled else 0
+        return sum(count for _, count in self.shapes) if self.is_coupled else 0
 
-    def keeps(self, mode: str) -> bool:
+    def keeps_shape(self, mode: str) -> bool:
         """Whether a shape of this name ("y2") is kept; static shapes always are."""
         direction = mode.rstrip("0123456789")
         counts = dict(self.shapes)
@@ -102,18 +102,18 @@ class Bodies:
     def scene_of(self, choices: Mapping[str, BodyModel]) -> Scene:
         """The scene with these models of its flexible bodies."""
 
-        def chosen(body: Any) -> Any:
+        def choose_model(body: Any) -> Any:
             choice = choices.get(body.name)
             return body if choice is None else self._with_choice(body, choice)
 
         return with_tables(
             self.scene,
-            beam=tuple(map(chosen, self.scene.beam)),
-            elastic=tuple(map(chosen, self.scene.elastic)),
+            beam=tuple(map(choose_model, self.scene.beam)),
+            elastic=tuple(map(choose_model, self.scene.elastic)),
         )
 
     def _with_choice(self, body: Any, choice: BodyModel) -> Any:
-        if not choice.coupled:
+        if not choice.is_coupled:
             return body.model_copy(update={"model": LEVELS[choice.level]})
         update: dict[str, Any] = {
             "model": LEVELS["coupled"], "stiffening": choice.level == STIFFENED,

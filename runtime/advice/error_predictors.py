@@ -73,7 +73,7 @@ class ErrorPrediction:
         if choice.level == ONE_WAY:
             recoil = _RECOIL * chi / (1 - chi) if chi < 1 else _MAX_ONE_WAY
             return d * min(recoil, _MAX_ONE_WAY) + shortening
-        left_out = sum(size for name, size in self.by_shape.items() if not choice.keeps(name))
+        left_out = sum(size for name, size in self.by_shape.items() if not choice.keeps_shape(name))
         return left_out + (shortening if choice.level == LINEAR else 0.0)
 
     def rise(self, until: float) -> float:
@@ -105,10 +105,10 @@ def body_predictions(result: Result, reach: float) -> dict[str, ErrorPrediction]
     Raises NumericalFailure if the elastic response cannot be computed.
     """
     model = result.model
-    bodies: Mapping[str, ModalBody] = model.flexible
+    bodies: Mapping[str, ModalBody] = model.flexible_bodies
     if isinstance(result, OneWayResult):
         bodies = rigidified_bodies(model).one_way
-    ranges = {model_range.name: model_range for model_range in result.certificate.flexible}
+    ranges = {model_range.name: model_range for model_range in result.certificate.flexible_bodies}
     predictions = {}
     for name, body in bodies.items():
         if name in ranges:
@@ -122,7 +122,7 @@ def _modal_coordinates(result: Result, name: str) -> Array:
     """(n, modes) modal coordinates."""
     if isinstance(result, OneWayResult):
         return np.asarray(result.response(name).eta)
-    return result.q[:, result.model.layout.modal[name].q_slice]
+    return result.q[:, result.model.coordinate_layout.modal[name].q_slice]
 
 
 def _loaded_ends(model: CompiledScene, name: str) -> set[str]:

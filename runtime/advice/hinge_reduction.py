@@ -41,30 +41,38 @@ class Change:
     """Possible change of a hinge, chain or spring of a scene.
 
     Attributes:
-        what: kind and name of the changed element.
-        words: description of the change, with numbers.
-        expected: estimated displacement of the attached bodies, m; 0 if unknown.
+        element: kind and name of the changed element.
+        description: description of the change, with numbers.
+        expected_displacement: estimated displacement of the attached bodies, m; 0 if unknown.
         name: name of the changed element; of a member of a chain, its name in the expanded chain.
-        made: new hinge or chain, None for an omitted spring.
+        replacement: new hinge or chain, None for an omitted spring.
         parts: smaller changes to try if the error of this one is too large.
     """
 
-    what: str
-    words: str
-    expected: float
+    element: str
+    description: str
+    expected_displacement: float
     name: str
-    made: Hinge | Chain | None = None
+    replacement: Hinge | Chain | None = None
     parts: tuple[Change, ...] = ()
 
     def __str__(self) -> str:
-        return f"{self.what}: {self.words}"
+        return f"{self.element}: {self.description}"
 
 
 def apply_changes(scene: Scene, changes: Sequence[Change]) -> ExpandedScene:
     """The scene with these changes; chains with changed members are expanded."""
-    new_hinges = {change.name: change.made for change in changes if isinstance(change.made, Hinge)}
-    new_chains = {change.name: change.made for change in changes if isinstance(change.made, Chain)}
-    omitted_springs = {change.name for change in changes if change.made is None}
+    new_hinges = {
+        change.name: change.replacement
+        for change in changes
+        if isinstance(change.replacement, Hinge)
+    }
+    new_chains = {
+        change.name: change.replacement
+        for change in changes
+        if isinstance(change.replacement, Chain)
+    }
+    omitted_springs = {change.name for change in changes if change.replacement is None}
     changed = with_tables(
         scene,
         chain=tuple(new_chains.get(chain.name, chain) for chain in scene.chain),
@@ -109,17 +117,17 @@ def rigid_hinge_changes(scene: Scene, model: CompiledScene, q: Array, reach: flo
             continue
         if simulated is None or simulated.type != hinge.type:
             continue
-        if hinge.drive is not None or hinge.lets_go or name in released:
+        if hinge.drive is not None or hinge.is_released or name in released:
             continue
-        hinge_q = q[:, model.layout.hinges[name].q_slice]
+        hinge_q = q[:, model.coordinate_layout.hinges[name].q_slice]
         change = None
         if properties.quaternion is not None:
             change = _rigid_at_reference_position(hinge, hinge_q, reach)
         elif properties.straight:
             change = _rigid_at_mean_position(hinge, hinge_q, reach)
         if change is not None:
-            changes.append(replace(change, what=f'hinge "{name}"'))
-    return sorted(changes, key=lambda change: change.expected)
+            changes.append(replace(change, element=f'hinge "{name}"'))
+    return sorted(changes, key=lambda change: change.expected_displacement)
 
 
 def _rigid_at_mean_position(hinge: Hinge, hinge_q: Array, reach: float) -> Change:
@@ -193,7 +201,7 @@ def omission_changes(scene: Scene) -> list[Change]:
             _omission_text(_passive_law_names(hinge.law)),
             0.0,
             hinge.name,
-            _without_passive_law(hinge),
+            _remove_passive_law(hinge),
         )
         for name, hinge in _hinges(scene)
         if _has_passive_law(hinge)
@@ -202,7 +210,7 @@ def omission_changes(scene: Scene) -> list[Change]:
     for chain in scene.chain:
         if any(_has_passive_law(hinge) for hinge in chain.hinge):
             hinges = tuple(
-                _without_passive_law(hinge) if _has_passive_law(hinge) else hinge
+                _remove_passive_law(hinge) if _has_passive_law(hinge) else hinge
                 for hinge in chain.hinge
             )
             omitted = dict.fromkeys(
@@ -230,7 +238,7 @@ def omission_changes(scene: Scene) -> list[Change]:
     return changes
 
 
-def _without_passive_law(hinge: T) -> T:
+def _remove_passive_law(hinge: T) -> T:
     """A hinge without springs, dampers and friction."""
     update = {key: getattr(_zero_law(hinge), key) for key in _PASSIVE}
     return hinge.model_copy(update={"law": hinge.law.model_copy(update=update)})

@@ -37,13 +37,13 @@ class Renaming(Measure):
     """Error measure that reads results of renamed models by the former names."""
 
     def __init__(self, inner: Measure) -> None:
-        self.inner = inner
+        self.measure = inner
         self.name, self.unit, self.scaling = inner.name, inner.unit, inner.scaling
         self._renamings: dict[
             int, tuple[CompiledScene, Mapping[str, str], Mapping[str, Vector]]
         ] = {}
 
-    def know(
+    def register(
         self,
         model: CompiledScene,
         names: Mapping[str, str],
@@ -52,24 +52,24 @@ class Renaming(Measure):
         """Register the names of a model: former name -> new name, or -> fixed position (3,), m."""
         self._renamings[id(model)] = (model, names, still or {})
 
-    def names_in(self, model: CompiledScene) -> Mapping[str, str]:
+    def names_of(self, model: CompiledScene) -> Mapping[str, str]:
         """Names of a model: former name -> new name."""
         return self._renamings[id(model)][1] if id(model) in self._renamings else {}
 
     def read(self, result: Record) -> Array:
         """Measured values (n, k) of a run at its samples."""
         if id(result.model) not in self._renamings:
-            return self.inner.read(result)
+            return self.measure.read(result)
         _, names, still = self._renamings[id(result.model)]
-        return self.inner.read(cast("Record", _RenamedRecord(result, names, still)))
+        return self.measure.read(cast("Record", _RenamedRecord(result, names, still)))
 
-    def apart(self, a: Array, b: Array) -> Array:
+    def distance(self, a: Array, b: Array) -> Array:
         """Distances (n,) between two sets of measured values."""
-        return self.inner.apart(a, b)
+        return self.measure.distance(a, b)
 
-    def scale_by(self, numbers: Array) -> None:
+    def set_scales(self, numbers: Array) -> None:
         """Scale relative errors by the measured values of the reference."""
-        self.inner.scale_by(numbers)
+        self.measure.set_scales(numbers)
 
 
 class _RenamedRecord:
@@ -78,11 +78,11 @@ class _RenamedRecord:
     def __init__(
         self, result: Record, names: Mapping[str, str], still: Mapping[str, Vector]
     ) -> None:
-        self._result, self._names, self._still = result, names, still
+        self._result, self._names, self._fixed_points = result, names, still
 
     def position(self, name: str) -> Array:
-        if name in self._still:
-            return np.tile(self._still[name], (len(self._result.t), 1))
+        if name in self._fixed_points:
+            return np.tile(self._fixed_points[name], (len(self._result.t), 1))
         return self._result.position(rename_reference(name, self._names))
 
     def quantity(self, name: str) -> Quantity:

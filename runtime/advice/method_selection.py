@@ -15,6 +15,7 @@ from ..chart.pareto_front import bound_errors, recommend
 from ..chart.repeated_timing import repeat_timings
 from ..chart.time_budget import ALL, EARLY, Budget, OutOfTime
 from ..chart.trial_run import Runs
+from ..model.target_error.error_request import ErrorRequest
 from .measure_renaming import rename_reference
 from .trial_models import TrialResult, TrialRunner
 
@@ -31,13 +32,13 @@ _REPEATED, _EQUAL_TIME_RATIO = 8, 1.15
 class SelectedSetting:
     """Setting of a model, with its error and CPU time in `point`.
 
-    They refer to the compared time span; with `whole` the integration was checked over the whole
-    run.
+    They refer to the compared time span; with `covers_whole_run` the integration was checked over
+    the whole run.
     """
 
-    tried: TrialResult
+    trial: TrialResult
     point: Point
-    whole: bool = False
+    covers_whole_run: bool = False
 
 
 def cheapest_setting(
@@ -55,13 +56,13 @@ def cheapest_setting(
     """
     budget = Budget(seconds, bench.budget.clock)
     runs = Runs(bench.span.t_end, np.array(bench.runs.times), budget)
-    survey = Survey(bench.reference, bench.measure, runs, bench.tell)
+    survey = Survey(bench.reference, bench.measure, runs, bench.report)
     reference = Reference(0.0, "", "", bench.measure.name, bench.measure.unit, "")
     model_errors = {tried.name: tried.error / bench.span.growth for tried in finalists}
     curves = []
     for tried in finalists:
-        model, enough = tried.running, _SUFFICIENT_ERROR * target_error
-        names = bench.measure.names_in(model)
+        model, enough = tried.compiled_model, _SUFFICIENT_ERROR * target_error
+        names = bench.measure.names_of(model)
         quantities = tuple(rename_reference(name, names) for name in of)
         model_error = model_errors[tried.name]
         setting = _setting_for_error(
@@ -73,12 +74,12 @@ def cheapest_setting(
             method_curve(method, tried.name, model, bench.span.t_end, enough, model_error)
             for method in PROMISING
         ]
-    surveyed = survey.make(curves, EARLY)
+    surveyed = survey.run_curves(curves, EARLY)
     points = bound_errors(surveyed.points, reference)
     sufficient = [
         i
         for i, point in enumerate(points)
-        if point.sure_error is not None and point.sure_error <= target_error
+        if point.error_bound is not None and point.error_bound <= target_error
     ]
     if not sufficient:
         raise NumericalFailure(f"no setting reaches an error of {target_error:.1e}")
@@ -88,7 +89,7 @@ def cheapest_setting(
     repeated = [*fastest, *(i for i in others if points[i].model == smallest_name)]
     repeated = repeated[: 2 * _REPEATED]
     models = [surveyed.models[i] for i in repeated]
-    timed, _ = repeat_timings([points[i] for i in repeated], models, rounds, runs, bench.tell)
+    timed, _ = repeat_timings([points[i] for i in repeated], models, rounds, runs, bench.report)
     best = recommend(timed, target_error, reference)
     of_smallest = [point for point in timed if point.model == smallest_name]
     if of_smallest:  # prefer the smallest model unless it is slower
@@ -103,11 +104,11 @@ def _setting_for_error(
 ) -> Setting | None:
     """Setting that `simulate` selects for an integration error; None if it fails."""
     try:
-        options = {"error": error, "error_of": of}
-        result, _ = runs.called(tried.running, options, runs.budget.share(ALL))
+        options = {"error": ErrorRequest(error, of)}
+        result, _ = runs.simulate_with(tried.compiled_model, options, runs.budget.run_limit(ALL))
     except (OutOfTime, MstmmError, ArithmeticError, np.linalg.LinAlgError):
         return None
-    estimate = result.error_estimate
+    estimate = result.achieved_error
     if estimate is None or not result.is_comparable:
         return None
     return Setting(estimate.method, tried.name, estimate.rtol)
@@ -122,12 +123,12 @@ def compare_cpu_times(
     rounds: int,
 ) -> tuple[float, float] | None:
     """CPU times of two runs in alternating rounds, s; None if one fails or takes too long."""
-    points, models = [], [a.running, b.running]
+    points, models = [], [a.compiled_model, b.compiled_model]
     for model, model_setting in zip(models, (setting, other), strict=True):
-        trial = bench.runs.trial(model, model_setting, bench.measure, bench.budget.left() / 2)
+        trial = bench.runs.trial(model, model_setting, bench.measure, bench.budget.remaining() / 2)
         if trial.numbers is None:
             return None
         points.append(Point(model_setting, 0.0, trial.cpu_s, 1))
-    timed, _ = repeat_timings(points, models, rounds, bench.runs, bench.tell)
+    timed, _ = repeat_timings(points, models, rounds, bench.runs, bench.report)
     first, second = (point.cpu_s or 0.0 for point in timed)
     return first, second

@@ -31,7 +31,7 @@ def choice_reason(
             f"gamma {prediction.load_ratio:.1e})"
         )
     parts = [deflects, _stiffening_text(choice, prediction, in_measure, target_error)]
-    omitted_shapes = sorted(name for name in prediction.by_shape if not choice.keeps(name))
+    omitted_shapes = sorted(name for name in prediction.by_shape if not choice.keeps_shape(name))
     if omitted_shapes:
         deflection = sum(prediction.by_shape[name] for name in omitted_shapes) * in_measure
         parts.append(

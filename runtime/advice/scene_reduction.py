@@ -36,20 +36,20 @@ def reduce_to_plane(
     state: AdviceState, top: Variant, model: Model, richest: TrialResult
 ) -> TrialResult:
     """The planar form of the richest scene, if its motion is the same; else the scene."""
-    if not state.bench.span.whole:
+    if not state.runner.span.is_whole_run:
         return richest
-    planar = planar_level(top, model, state.bench.reference.q)
+    planar = planar_level(top, model, state.runner.reference.q)
     if planar is None:
         return richest
-    tried = state.bench.tried("planar", planar.scene)
-    if tried.error > max(_PLANAR_ERROR * state.asked.error, 3 * state.bench.floor):
+    tried = state.runner.run_trial("planar", planar.scene)
+    if tried.error > max(_PLANAR_ERROR * state.request.error, 3 * state.runner.floor):
         return richest
     hinges = [
         f'hinge "{old.name}": {new.type} instead of {old.type}, because the motion is planar'
         for old, new in zip(top.scene.hinge, planar.scene.hinge, strict=True)
         if old != new
     ]
-    state.told[tried.name] = (*hinges, _measured_text("planar scene", tried, richest))
+    state.change_texts[tried.name] = (*hinges, _measured_text("planar scene", tried, richest))
     return tried
 
 
@@ -66,24 +66,30 @@ def reduce_by_halves(
     All changes are tried together, then by halves, down to the parts of single changes.  `word`
     describes the changes in names of models.
     """
-    if not state.bench.span.whole:
+    if not state.runner.span.is_whole_run:
         return base
-    names = state.measure.names_in(base.running)
+    names = state.measure.names_of(base.compiled_model)
     kept: list[Change] = []
     best, chain_sentences = base, tuple[str, ...]()
     limit = _MAX_ESTIMATE * max_error
-    waiting = [[change for change in changes if change.expected * state.in_measure <= limit]]
-    sentences = state.told[base.name]
-    while waiting and state.budget.left(SEARCH):
+    waiting = [
+        [
+            change
+            for change in changes
+            if change.expected_displacement * state.error_per_metre <= limit
+        ]
+    ]
+    sentences = state.change_texts[base.name]
+    while waiting and state.budget.remaining(SEARCH):
         group = waiting.pop()
         if not group:
             continue
         changed = apply_changes(base.scene, [*kept, *group])
         changed_names = ", ".join(change.name for change in (*kept, *group))
         name = f"{base.name}; {word}: {changed_names}"
-        tried = state.bench.tried(name, changed.scene, compose_names(names, changed.names))
-        if tried.error <= max_error and (not cheap or state.bench.as_cheap(tried, best)):
-            kept, best, chain_sentences = [*kept, *group], tried, changed.words
+        tried = state.runner.run_trial(name, changed.scene, compose_names(names, changed.names))
+        if tried.error <= max_error and (not cheap or state.runner.is_as_cheap(tried, best)):
+            kept, best, chain_sentences = [*kept, *group], tried, changed.descriptions
         elif len(group) > 1:
             half = len(group) // 2
             waiting += [group[half:], group[:half]]
@@ -94,7 +100,7 @@ def reduce_by_halves(
         single = [_single_change_text(state, base, word, change, names) for change in kept]
         if len(kept) > 1:
             single.append(_measured_text(f"with these {len(kept)} changes", best, base))
-        state.told[best.name] = (*sentences, *single, *chain_sentences)
+        state.change_texts[best.name] = (*sentences, *single, *chain_sentences)
     return best
 
 
@@ -102,10 +108,10 @@ def _single_change_text(
     state: AdviceState, base: TrialResult, word: str, change: Change, names: Mapping[str, str]
 ) -> str:
     """Description of a change, with its effect alone if there is time for a run."""
-    if not state.budget.left(SEARCH):
+    if not state.budget.remaining(SEARCH):
         return str(change)
     changed = apply_changes(base.scene, [change])
-    tried = state.bench.tried(
+    tried = state.runner.run_trial(
         f"{base.name}; {word}: {change.name}", changed.scene, compose_names(names, changed.names)
     )
     return _measured_text(f"{change}; this change alone", tried, base)
@@ -114,7 +120,7 @@ def _single_change_text(
 def _measured_text(description: str, tried: TrialResult, before: TrialResult) -> str:
     """Error of a model, and its CPU time relative to the model before a change."""
     if not math.isfinite(tried.error):
-        return f"{description}: fails ({tried.why})"
+        return f"{description}: fails ({tried.reason})"
     ratio = tried.cpu_s / before.cpu_s
     return f"{description}: error {tried.error:.1e}, {ratio:.2f} of the time before"
 
@@ -124,19 +130,23 @@ def merge_welded(state: AdviceState, base: TrialResult, max_error: float) -> Tri
 
     If the compared quantities are not available then, their bodies and hinges are kept.
     """
-    names_now = state.measure.names_in(base.running)
-    compared = {split_reference(rename_reference(name, names_now))[0] for name in state.asked.of}
+    names_now = state.measure.names_of(base.compiled_model)
+    compared = {split_reference(rename_reference(name, names_now))[0] for name in state.request.of}
     for keep in [set(), compared] if compared else [set()]:
         merged = merge_welds(base.scene, keep)
         if merged is None:
             return base
         name = f"{base.name}; welded bodies merged" + (", except compared ones" if keep else "")
         names = compose_names(names_now, merged.names)
-        still = dict(merged.still)
+        still = dict(merged.fixed_points)
         still |= {old: still[new] for old, new in names_now.items() if new in still}
-        tried = state.bench.tried(name, merged.scene, names, still)
+        tried = state.runner.run_trial(name, merged.scene, names, still)
         if tried.error <= max_error:
             effect = _measured_text("with welded bodies merged", tried, base)
-            state.told[name] = (*state.told[base.name], *merged.words, effect)
+            state.change_texts[name] = (
+                *state.change_texts[base.name],
+                *merged.descriptions,
+                effect,
+            )
             return tried
     return base

@@ -34,25 +34,25 @@ class ModelSearch:
 
     Attributes:
         bodies: the flexible bodies.
-        bench: runner of trial models.
+        runner: runner of trial models.
         evidence: error estimates by body.
-        enough: allowed error.
-        in_measure: factor from m to the unit of errors.
-        time_left: whether there is time for more trials.
-        failed: (body, model) that were tried without success.
-        made: name of a scene model -> its choices.
+        allowed_error: allowed error.
+        error_per_metre: factor from m to the unit of errors.
+        has_time_left: whether there is time for more trials.
+        failed_models: (body, model) that were tried without success.
+        choices_by_name: name of a scene model -> its choices.
         out_of_time: whether the time limit has been reached.
         skipped: bodies whose smaller models were not tried for lack of time.
     """
 
     bodies: Bodies
-    bench: TrialRunner
+    runner: TrialRunner
     evidence: Mapping[str, ErrorPrediction]
-    enough: float
-    in_measure: float
-    time_left: Callable[[], bool]
-    failed: set[tuple[str, BodyModel]] = field(default_factory=set)
-    made: dict[str, Choices] = field(default_factory=dict)
+    allowed_error: float
+    error_per_metre: float
+    has_time_left: Callable[[], bool]
+    failed_models: set[tuple[str, BodyModel]] = field(default_factory=set)
+    choices_by_name: dict[str, Choices] = field(default_factory=dict)
     out_of_time: bool = False
     skipped: list[str] = field(default_factory=list)
 
@@ -61,16 +61,16 @@ class ModelSearch:
         choices, tried = self._enlarge()
         return self._reduce(choices, tried)
 
-    def expected(self, name: str, choice: BodyModel) -> float | None:
+    def expected_error(self, name: str, choice: BodyModel) -> float | None:
         """Estimated error of a model of one body; None without estimate."""
         prediction = self.evidence.get(name)
-        return None if prediction is None else prediction.error(choice) * self.in_measure
+        return None if prediction is None else prediction.error(choice) * self.error_per_metre
 
-    def tried(self, choices: Mapping[str, BodyModel]) -> TrialResult:
+    def try_choices(self, choices: Mapping[str, BodyModel]) -> TrialResult:
         """Trial of the scene with these models of its bodies."""
         name = self.name(choices)
-        self.made[name] = dict(choices)
-        return self.bench.tried(name, self.bodies.scene_of(choices))
+        self.choices_by_name[name] = dict(choices)
+        return self.runner.run_trial(name, self.bodies.scene_of(choices))
 
     def name(self, choices: Mapping[str, BodyModel]) -> str:
         """Description of the scene; bodies with the same model are listed together."""
@@ -87,19 +87,19 @@ class ModelSearch:
         """Make bodies richer until the scene suffices."""
         choices = {name: self._initial_choice(name) for name in self.bodies.richest}
         while True:
-            tried = self.tried(choices)
-            if tried.error <= self.enough or choices == self.bodies.richest:
+            tried = self.try_choices(choices)
+            if tried.error <= self.allowed_error or choices == self.bodies.richest:
                 return choices, tried
             if not self._has_time():
                 self.skipped = list(choices)
-                return dict(self.bodies.richest), self.tried(self.bodies.richest)
+                return dict(self.bodies.richest), self.try_choices(self.bodies.richest)
             choices = self.richer(choices)
 
     def _initial_choice(self, name: str) -> BodyModel:
         """The smallest model that is expected to suffice."""
-        limit = _SUFFICIENT * self.enough / len(self.bodies.richest)
+        limit = _SUFFICIENT * self.allowed_error / len(self.bodies.richest)
         for choice in self._choices_upward(name):
-            estimate = self.expected(name, choice)
+            estimate = self.expected_error(name, choice)
             if estimate is not None and estimate <= limit and self._is_valid(name, choice):
                 return choice
         return self.bodies.richest[name]
@@ -153,7 +153,7 @@ class ModelSearch:
     def richer(self, choices: Choices) -> Choices:
         """Choices with richer models of the bodies with the largest estimated errors."""
         candidates = {name for name in choices if choices[name] != self.bodies.richest[name]}
-        estimates = {name: self.expected(name, choices[name]) for name in candidates}
+        estimates = {name: self.expected_error(name, choices[name]) for name in candidates}
         errors = {name: math.inf if error is None else error for name, error in estimates.items()}
         max_error = max(errors.values())
         richer = dict(choices)
@@ -165,9 +165,9 @@ class ModelSearch:
     def _next_choice(self, name: str, choice: BodyModel) -> BodyModel:
         """The next model with a smaller estimated error; the richest if there is none."""
         models = list(self._choices_upward(name))
-        current = self.expected(name, choice)
+        current = self.expected_error(name, choice)
         for model in models[models.index(choice) + 1 :] if choice in models else ():
-            estimate = self.expected(name, model)
+            estimate = self.expected_error(name, model)
             is_smaller = estimate is None or current is None or estimate < _SUFFICIENT * current
             if is_smaller and self._is_valid(name, model):
                 return model
@@ -183,23 +183,23 @@ class ModelSearch:
             while is_reduced:
                 is_reduced = False
                 for choice in self._smaller_choices(name, choices[name]):
-                    if (name, choice) in self.failed or not self._is_promising(name, choice):
+                    if (name, choice) in self.failed_models or not self._is_promising(name, choice):
                         continue
                     if not self._has_time():
                         self.skipped = self.skipped or order[k:]
                         return choices, best
                     smaller = {**choices, name: choice}
-                    tried = self.tried(smaller)
-                    if tried.error <= self.enough and self.bench.as_cheap(tried, best):
+                    tried = self.try_choices(smaller)
+                    if tried.error <= self.allowed_error and self.runner.is_as_cheap(tried, best):
                         choices, best, is_reduced = smaller, tried, True
                         break
-                    self.failed.add((name, choice))
+                    self.failed_models.add((name, choice))
         return choices, best
 
     def _is_promising(self, name: str, choice: BodyModel) -> bool:
-        estimate = self.expected(name, choice)
+        estimate = self.expected_error(name, choice)
         factor = _MAX_ONE_WAY_ESTIMATE if choice.level == ONE_WAY else _MAX_ESTIMATE
-        return estimate is None or estimate <= factor * self.enough
+        return estimate is None or estimate <= factor * self.allowed_error
 
     def _smaller_choices(self, name: str, choice: BodyModel) -> Iterator[BodyModel]:
         """Models smaller than a given one, the smallest first."""
@@ -219,6 +219,6 @@ class ModelSearch:
             yield BodyModel(LINEAR, choice.shapes)
 
     def _has_time(self) -> bool:
-        if not self.time_left():
+        if not self.has_time_left():
             self.out_of_time = True
         return not self.out_of_time

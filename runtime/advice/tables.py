@@ -9,15 +9,18 @@ from .advice import Advice
 def summary_lines(advice: Advice) -> list[str]:
     """Summary of the advice in one or two lines."""
     unit = "" if advice.unit == "1" else f" {advice.unit}"
-    target = f"for an error of {advice.asked:.2g}{unit} of {advice.measure}{advice.in_words}"
-    exceeded = "" if advice.error <= advice.asked else ", LARGER than the target error"
+    target = (
+        f"for an error of {advice.target_error:.2g}{unit} of {advice.measure}{advice.scaling_text}"
+    )
+    exceeded = "" if advice.error <= advice.target_error else ", LARGER than the target error"
     lines = [
         f"{target}: {_model_text(advice)} by {advice.method}, {advice.setting}: error "
-        f"{advice.error:.1e}{exceeded}, {format_time(advice.cpu_s)} CPU over {advice.compared}",
+        f"{advice.error:.1e}{exceeded}, {format_time(advice.cpu_s)} CPU over "
+        f"{advice.comparison_text}"
     ]
     savings = [
         _saving_text(
-            "the model", advice.model_saving if advice.reduced else None, "the given scene"
+            "the model", advice.model_saving if advice.is_reduced else None, "the given scene"
         ),
         _saving_text("method and tolerance", advice.setting_saving, "the default ones"),
     ]
@@ -42,7 +45,7 @@ def _factor_text(saving: float) -> str:
 
 
 def _model_text(advice: Advice) -> str:
-    if not advice.reduced:
+    if not advice.is_reduced:
         return "the scene as it is"
     return "a reduced scene"
 
@@ -52,9 +55,9 @@ def body_table(advice: Advice) -> Table:
     head = ("body", "given", "advised", "error of this choice", "time of this choice")
     rows = [
         (
-            body.name, str(body.given), str(body.choice),
+            body.name, str(body.given_model), str(body.model),
             "" if body.error is None else f"{body.error:.1e}",
-            "" if body.saving is None else _factor_text(body.saving),
+            "" if body.speedup is None else _factor_text(body.speedup),
         )
         for body in advice.bodies
     ]  # fmt: skip
@@ -69,8 +72,8 @@ def trial_table(advice: Advice) -> Table:
             tried.name,
             "" if tried.error is None else f"{tried.error:.1e}",
             format_time(tried.cpu_s),
-            tried.why,
+            tried.reason,
         )
-        for tried in advice.tried
+        for tried in advice.tried_models
     ]
     return head, (1, 2), rows

@@ -54,28 +54,29 @@ class ComparisonWindow:
 
     Attributes:
         t_end: end of the window or of the whole run, s.
-        wanted: end of the run that the advice is for, s.
+        whole_t_end: end of the run that the advice is for, s.
         rise: ratio of the largest deflection of bodies in the run to that in the window.
     """
 
     t_end: float
-    wanted: float
+    whole_t_end: float
     rise: float = 1.0
 
     @property
-    def whole(self) -> bool:
+    def is_whole_run(self) -> bool:
         """Whether the whole run is compared."""
-        return self.t_end >= self.wanted
+        return self.t_end >= self.whole_t_end
 
     @property
     def growth(self) -> float:
         """Factor on errors of a window: ratio of the times, and of the deflections."""
-        return self.wanted / self.t_end * self.rise
+        return self.whole_t_end / self.t_end * self.rise
 
     def __str__(self) -> str:
-        if self.whole:
-            return f"the whole run of {self.wanted:g} s"
-        return f"the first {self.t_end:.3g} s of {self.wanted:g} s, errors times {self.growth:.3g}"
+        if self.is_whole_run:
+            return f"the whole run of {self.whole_t_end:g} s"
+        span = f"the first {self.t_end:.3g} s of {self.whole_t_end:g} s"
+        return f"{span}, errors times {self.growth:.3g}"
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,7 @@ class TrialResult:
         model: compiled model; None if it could not be compiled or its run failed.
         error: error relative to the richest model, over the whole run; inf if it failed.
         cpu_s: CPU time of the run, s.
-        why: reason of the failure, else "".
+        reason: reason of the failure, else "".
     """
 
     name: str
@@ -96,10 +97,10 @@ class TrialResult:
     model: Model | None
     error: float
     cpu_s: float
-    why: str = ""
+    reason: str = ""
 
     @property
-    def running(self) -> Model:
+    def compiled_model(self) -> Model:
         """Compiled model of a trial that did not fail."""
         assert self.model is not None
         return self.model
@@ -112,7 +113,7 @@ def choose_window(model: Model, t_end: float, samples: int, budget: Budget, meas
     Raises NumericalFailure if the model cannot be simulated.
     """
     runs = Runs(_PROBE_FRACTION * t_end, np.linspace(0.0, _PROBE_FRACTION * t_end, samples), budget)
-    limit = budget.left() * _REFERENCE_BUDGET
+    limit = budget.remaining() * _REFERENCE_BUDGET
     begin = budget.clock()
     trial = runs.trial(model, Setting(AUTO, "", rtol), measure, limit)
     spent = max(budget.clock() - begin, 1e-9)
@@ -124,9 +125,9 @@ def choose_window(model: Model, t_end: float, samples: int, budget: Budget, meas
     if trial.numbers is None:
         raise NumericalFailure(trial.failure)
     cost = 3.0 * spent / _PROBE_FRACTION  # two runs, one of them tighter
-    if cost <= _REFERENCE_BUDGET * budget.left():
+    if cost <= _REFERENCE_BUDGET * budget.remaining():
         return ComparisonWindow(t_end, t_end)
-    fraction = _WINDOW_BUDGET * budget.left() / cost
+    fraction = _WINDOW_BUDGET * budget.remaining() / cost
     return ComparisonWindow(max(min(fraction, 1.0), _PROBE_FRACTION) * t_end, t_end)
 
 
@@ -158,7 +159,7 @@ class TrialRunner:
     ) -> None:
         self.span, self.measure, self.budget = span, measure, budget
         self.runs = Runs(span.t_end, np.linspace(0.0, span.t_end, samples), budget)
-        self.compile, self.tell = compile, tell
+        self.compile, self.report = compile, tell
         self.rtol = _LOOSEST
         self.names: Mapping[str, str] = {}
         self.reference: Trial
@@ -166,7 +167,7 @@ class TrialRunner:
         self.late: list[str] = []
         self._results: dict[str, TrialResult] = {}
 
-    def refer_to(
+    def make_reference(
         self, scene: Scene, model: Model, name: str, asked: float, part: float
     ) -> TrialResult:
         """Run the richest model with tighter tolerances until two runs agree.
@@ -179,8 +180,8 @@ class TrialRunner:
         while True:
             tighter_rtol = max(self.rtol * _REFERENCE_RATIO, _TIGHTEST)
             tighter = self._run_richest(model, name, tighter_rtol)
-            self.measure.scale_by(_measured_values(tighter))
-            difference = self.apart(run, tighter)
+            self.measure.set_scales(_measured_values(tighter))
+            difference = self.distance(run, tighter)
             if difference <= _MAX_DIFFERENCE * asked:
                 break
             if tighter_rtol <= _TIGHTEST:
@@ -200,24 +201,24 @@ class TrialRunner:
         `names` are its names of bodies and ends.  Raises MstmmError if it cannot be compiled; a
         failure of the run is part of the trial.
         """
-        self.tell(name)
+        self.report(name)
         model = self.compile(scene)
-        self.measure.know(model, names)
-        limit = self.budget.left() * _MODEL_BUDGET
+        self.measure.register(model, names)
+        limit = self.budget.remaining() * _MODEL_BUDGET
         return self.runs.trial(model, Setting(AUTO, name, self.rtol), self.measure, limit)
 
-    def apart(self, a: Trial, b: Trial) -> float:
+    def distance(self, a: Trial, b: Trial) -> float:
         """Difference of two runs, extrapolated to the whole run; inf if unknown."""
         error = max_error(a, b, self.measure)
         return math.inf if isinstance(error, str) else error * self.span.growth
 
-    def refer_again(self, trial: Trial, names: Mapping[str, str]) -> None:
+    def use_as_reference(self, trial: Trial, names: Mapping[str, str]) -> None:
         """Use another run as the reference, with its names of bodies and ends; drop all results."""
         self.reference, self.names = trial, names
-        self.measure.scale_by(_measured_values(trial))
+        self.measure.set_scales(_measured_values(trial))
         self._results.clear()
 
-    def tried(
+    def run_trial(
         self, name: str, scene: Scene, names: Mapping[str, str] | None = None,
         still: Mapping[str, Vector] | None = None,
     ) -> TrialResult:  # fmt: skip
@@ -227,12 +228,12 @@ class TrialRunner:
         of the reference; `still`: name -> fixed position on the ground, m.
         """
         if name not in self._results:
-            self.tell(name)
+            self.report(name)
             self._results[name] = self._run_model(name, scene, names, still)
         return self._results[name]
 
     @property
-    def all(self) -> tuple[TrialResult, ...]:
+    def results(self) -> tuple[TrialResult, ...]:
         """Results of all trials, in their order."""
         return tuple(self._results.values())
 
@@ -242,10 +243,10 @@ class TrialRunner:
     ) -> TrialResult:  # fmt: skip
         try:
             model = self.compile(scene)
-            self.measure.know(model, self.names if names is None else names, still)
+            self.measure.register(model, self.names if names is None else names, still)
         except MstmmError as problem:
             return TrialResult(name, scene, None, math.inf, math.inf, str(problem))
-        limit = self.budget.left() * _MODEL_BUDGET
+        limit = self.budget.remaining() * _MODEL_BUDGET
         trial = self.runs.trial(model, Setting(AUTO, name, self.rtol), self.measure, limit)
         if trial.late:
             self.late.append(name)
@@ -267,12 +268,12 @@ class TrialRunner:
         times = [trial.cpu_s]
         if trial.cpu_s < _SHORT:
             times += [
-                self.runs.simulate(model, trial.setting, self.budget.left())[1]
+                self.runs.simulate(model, trial.setting, self.budget.remaining())[1]
                 for _ in range(_REPEATS - 1)
             ]
         return min(times)
 
-    def as_cheap(self, one: TrialResult, other: TrialResult) -> bool:
+    def is_as_cheap(self, one: TrialResult, other: TrialResult) -> bool:
         """Whether a model is not slower than another, within the scatter of timings.
 
         If it seems slower, both are timed again in turn: other processes may have delayed it.
@@ -284,7 +285,9 @@ class TrialRunner:
             for k, tried in enumerate(pair):
                 setting = Setting(AUTO, tried.name, self.rtol)
                 try:
-                    spent = self.runs.simulate(tried.running, setting, self.budget.left())[1]
+                    spent = self.runs.simulate(
+                        tried.compiled_model, setting, self.budget.remaining()
+                    )[1]
                 except OutOfTime:
                     return False
                 times[k] = min(times[k], spent)
@@ -292,8 +295,8 @@ class TrialRunner:
 
     def _run_richest(self, model: Model, name: str, rtol: float) -> Trial:
         """Run the richest model; NumericalFailure if the run fails."""
-        limit = self.budget.left() * 2 * _REFERENCE_BUDGET
-        self.tell(f"{name}, rtol {rtol:.0e}")
+        limit = self.budget.remaining() * 2 * _REFERENCE_BUDGET
+        self.report(f"{name}, rtol {rtol:.0e}")
         trial = self.runs.trial(model, Setting(AUTO, name, rtol), self.measure, limit)
         if trial.numbers is None:
             remedy = "; give a larger --budget" if trial.late else ""

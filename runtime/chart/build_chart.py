@@ -116,14 +116,14 @@ class _ChartBuilder:
         self, model: Model, request: ChartRequest, compile: Callable[[Scene], Model],
         report: Report, report_status: Callable[[str], None], budget: Budget,
     ) -> None:  # fmt: skip
-        if model.closed is None:
+        if model.loop_start is None:
             request = replace(request, methods=without_index3_duplicates(request.methods))
         self.model, self.request, self.compile = model, request, compile
         self.report, self.report_status, self.budget = report, report_status, budget
         self.times = equidistant_times(request.t_end, request.samples)
-        self.runs = Runs(request.t_end, self.times.at, budget)
-        self.left_out: list[Skipped] = []
-        self.levels: list[Level] = []
+        self.runs = Runs(request.t_end, self.times.times, budget)
+        self.skipped: list[Skipped] = []
+        self.model_levels: list[Level] = []
 
     def chart(self, title: str) -> Chart:
         request = self.request
@@ -142,11 +142,11 @@ class _ChartBuilder:
         )  # fmt: skip
         self._report_reference(reference)
         curves = self._curves(variants, richest, best, measure, reference)
-        if reference.still:
+        if reference.is_static:
             curves = []
         survey = Survey(best.run, measure, self.runs, self.report)
-        survey.make([curve for curve in curves if curve.method in PROMISING], EARLY)
-        surveyed = survey.make(
+        survey.run_curves([curve for curve in curves if curve.method in PROMISING], EARLY)
+        surveyed = survey.run_curves(
             [curve for curve in curves if curve.method not in PROMISING], SETTINGS
         )
         points, missed = repeat_timings(
@@ -157,19 +157,19 @@ class _ChartBuilder:
                 f"{missed} of {len(points)} runs were timed less often than the others, for lack "
                 "of time"
             )
-            self.left_out.append(Skipped("", "", "", reason, False))
+            self.skipped.append(Skipped("", "", "", reason, False))
         level_errors = {
             level.name: level.error
-            for level in self.levels
+            for level in self.model_levels
             if level.error is not None and level.name != reference.model
         }
         points_with_bounds, common_warnings = split_warnings(
             bound_errors(points, reference, level_errors)
         )
         return Chart(
-            title, request.t_end, len(self.times.at), reference, points_with_bounds,
-            tuple(self.levels), (*self.left_out, *surveyed.left_out), request.error, request.budget,
-            self.budget.spent, self.times.words,
+            title, request.t_end, len(self.times.times), reference, points_with_bounds,
+            tuple(self.model_levels), (*self.skipped, *surveyed.skipped), request.error,
+            request.budget, self.budget.elapsed, self.times.description,
             (*scene_warnings(richest.scene), *common_warnings),
         )  # fmt: skip
 
@@ -177,22 +177,22 @@ class _ChartBuilder:
         """Add times where the motion is fast, unless the run for that takes too long."""
         self.report("run to choose the times of the error")
         setting = Setting(AUTO, name, _STEP_SIZE_RTOL)
-        steps = self.runs.steps(richest, setting, self.budget.share(REFERENCE))
+        steps = self.runs.steps(richest, setting, self.budget.run_limit(REFERENCE))
         if not len(steps):
             return
         self.times = refine_times(equidistant_times(steps[-1], self.request.samples), steps)
-        self.runs.times = self.times.at
+        self.runs.times = self.times.times
 
     def _report_reference(self, reference: Reference) -> None:
         """Report the reference, and the times at which errors are evaluated."""
         self.report_status(
             f"reference: {reference.made_by}; its own error is {reference.error:.1e}"
         )
-        self.report_status(f"errors are evaluated at {self.times.words}")
-        if reference.ended:
-            self.report_status(f"runs end before {self.request.t_end:g} s: {reference.ended}")
-        if reference.still:
-            self.report_status("nothing moves in this scene: no methods are compared")
+        self.report_status(f"errors are evaluated at {self.times.description}")
+        if reference.stop_event:
+            self.report_status(f"runs end before {self.request.t_end:g} s: {reference.stop_event}")
+        if reference.is_static:
+            self.report_status("the scene has no degrees of freedom: no methods are compared")
 
     def _richest_model(self, variants: Sequence[Variant]) -> Model:
         """Model of the richest level; compiled like the other levels if there are any."""
@@ -212,13 +212,20 @@ class _ChartBuilder:
             if evaluated is not None:
                 models.append((variant.name, *evaluated))
         if self.request.models and not others:
-            self.left_out.append(Skipped("", "", "", _NO_MODELS, True))
+            self.skipped.append(Skipped("", "", "", _NO_MODELS, True))
         models.append((reference.model, richest, None))
-        self.levels.append(
+        self.model_levels.append(
             Level(reference.model, reference.error, _degrees_of_freedom(richest), richest.engine)
         )
         return [
-            method_curve(method, level, model, self.request.t_end, reference.floor, level_error)
+            method_curve(
+                method,
+                level,
+                model,
+                self.request.t_end,
+                reference.smallest_resolved_error,
+                level_error,
+            )
             for method in self.request.methods
             for level, model, level_error in models
         ]
@@ -235,17 +242,17 @@ class _ChartBuilder:
             model = self.compile(variant.scene)
             run = self._run_accurately(model, variant.name, best, measure)
         except MstmmError as problem:
-            self.left_out.append(Skipped("", variant.name, "", str(problem), True))
+            self.skipped.append(Skipped("", variant.name, "", str(problem), True))
             return None
         if run.numbers is None and not run.late:
-            self.left_out.append(Skipped("", variant.name, "", run.failure, True))
+            self.skipped.append(Skipped("", variant.name, "", run.failure, True))
             return None
         error = "the run took too long" if run.late else max_error(run, best.run, measure)
         if isinstance(error, str):
             reason = f"error of the model level unknown: {error}"
-            self.left_out.append(Skipped("", variant.name, "", reason, False))
+            self.skipped.append(Skipped("", variant.name, "", reason, False))
         level_error = None if isinstance(error, str) else error
-        self.levels.append(
+        self.model_levels.append(
             Level(variant.name, level_error, _degrees_of_freedom(model), model.engine)
         )
         return model, level_error
@@ -255,7 +262,7 @@ class _ChartBuilder:
 
         An accurate level needs the setting of the reference for that.
         """
-        limit = self.budget.share(_LEVEL_BUDGET)
+        limit = self.budget.run_limit(_LEVEL_BUDGET)
         run = self.runs.trial(model, Setting(AUTO, level, _LEVEL_RTOL), measure, limit)
         if run.numbers is None:
             return run
@@ -269,7 +276,7 @@ class _ChartBuilder:
 
 def _degrees_of_freedom(model: Model) -> int:
     """Number of degrees of freedom; of a mechanism, its mobility."""
-    return model.nu if model.closed is None else model.closed.loops.mobility
+    return model.nu if model.loop_start is None else model.loop_start.loops.mobility
 
 
 def _is_static(q: Array) -> bool:

@@ -47,12 +47,12 @@ class Point:
         cpu_s: CPU time of the whole call of `simulate`, the smallest of `repeats` calls; s.
         evaluations, factorizations, steps: counts of the run, None if the method does not count.
         failure: reason why the run gave no error, "" if it did.
-        limited: the error is small enough to be the error of the reference.
-        sure_error: error bound: largest error of this setting and all tighter ones of its curve, so
-            that an accidentally small error does not count.
+        reference_limited: the error is small enough to be the error of the reference.
+        error_bound: error bound: largest error of this setting and all tighter ones of its curve,
+            so that an accidentally small error does not count.
         warnings: warnings of this run.
-        too_coarse: the fixed step is too long for the fastest motion; such a run is not trusted and
-            never recommended, however small its error.
+        is_too_coarse: the fixed step is too long for the fastest motion; such a run is not trusted
+            and never recommended, however small its error.
     """
 
     setting: Setting
@@ -63,10 +63,10 @@ class Point:
     factorizations: int | None = None
     steps: int | None = None
     failure: str = ""
-    limited: bool = False
-    sure_error: float | None = None
+    reference_limited: bool = False
+    error_bound: float | None = None
     warnings: tuple[str, ...] = ()
-    too_coarse: bool = False
+    is_too_coarse: bool = False
 
     @property
     def method(self) -> str:
@@ -87,11 +87,11 @@ class Point:
         """Plain values, as in chart.json."""
         return {
             "method": self.method, "model": self.model, "setting": self.setting.numbers,
-            "error": self.error, "sure_error": self.sure_error, "cpu_s": self.cpu_s,
+            "error": self.error, "sure_error": self.error_bound, "cpu_s": self.cpu_s,
             "repeats": self.repeats, "evaluations": self.evaluations,
             "factorizations": self.factorizations, "steps": self.steps,
-            "limited_by_reference": self.limited, "failure": self.failure or None,
-            "warnings": list(self.warnings), "too_coarse": self.too_coarse,
+            "limited_by_reference": self.reference_limited, "failure": self.failure or None,
+            "warnings": list(self.warnings), "too_coarse": self.is_too_coarse,
         }  # fmt: skip
 
 
@@ -99,21 +99,21 @@ class Point:
 class Skipped:
     """Method, model level or tighter settings of a curve that were not run, with the reason.
 
-    `refused`: the scene or the machine does not support it; otherwise time was short, or it would
-    have shown nothing new.
+    `is_unsupported`: the scene or the machine does not support it; otherwise time was short, or it
+    would have shown nothing new.
     """
 
     method: str
     model: str
     setting: str
     reason: str
-    refused: bool
+    is_unsupported: bool
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, as in chart.json."""
         return {
             "method": self.method or None, "model": self.model or None,
-            "setting": self.setting or None, "reason": self.reason, "refused": self.refused,
+            "setting": self.setting or None, "reason": self.reason, "refused": self.is_unsupported,
         }  # fmt: skip
 
     def __str__(self) -> str:
@@ -147,8 +147,8 @@ class Reference:
         made_by: description of the runs that were compared.
         model: name of its model level.
         measure, unit, scaling: compared quantity, its unit, and what it is divided by.
-        ended: event that ended its run, and when; "" if none did.
-        still: no coordinate moves.
+        stop_event: event that ended its run, and when; "" if none did.
+        is_static: no coordinate moves.
     """
 
     error: float
@@ -157,11 +157,11 @@ class Reference:
     measure: str
     unit: str
     scaling: str
-    ended: str = ""
-    still: bool = False
+    stop_event: str = ""
+    is_static: bool = False
 
     @property
-    def floor(self) -> float:
+    def smallest_resolved_error(self) -> float:
         """Smallest resolved error: errors below it may be those of the reference."""
         return 3.0 * self.error
 
@@ -170,5 +170,5 @@ class Reference:
         return {
             "error": self.error, "made_by": self.made_by, "model": self.model,
             "measure": self.measure, "unit": self.unit, "scaling": self.scaling,
-            "ended": self.ended or None, "still": self.still,
+            "ended": self.stop_event or None, "still": self.is_static,
         }  # fmt: skip

@@ -39,34 +39,34 @@ class ChartRecord:
     samples: int
     reference: Reference
     points: tuple[Point, ...]
-    levels: tuple[Level, ...]
-    left_out: tuple[Skipped, ...]
-    wanted: float
+    model_levels: tuple[Level, ...]
+    skipped: tuple[Skipped, ...]
+    target_error: float
     budget: float
-    spent: float
-    looked: str = ""
+    elapsed: float
+    sampling_text: str = ""
     warnings: tuple[str, ...] = ()
 
     @cached_property
-    def front(self) -> tuple[Point, ...]:
+    def pareto_front(self) -> tuple[Point, ...]:
         """Pareto front of error bound (`sure_error`) and CPU time, cheapest first."""
-        return pareto_front(self.points, self.reference.floor)
+        return pareto_front(self.points, self.reference.smallest_resolved_error)
 
-    def recommended(self, error: float | None = None) -> Point:
-        """Cheapest point whose error bound does not exceed `error` (default: `wanted`).
+    def recommend(self, error: float | None = None) -> Point:
+        """Cheapest point whose error bound does not exceed `error` (default: `target_error`).
 
         Raises SceneError for an error that is not above 0, and NumericalFailure, with the smallest
         error that was reached, if no point meets it or the reference is not accurate enough.
         """
-        target_error = self.wanted if error is None else error
+        target_error = self.target_error if error is None else error
         return recommend(self.points, target_error, self.reference)
 
-    def advice(self) -> list[tuple[float, Point]]:
+    def recommendations(self) -> list[tuple[float, Point]]:
         """(target error, recommended point) for every power of ten that is reached."""
         recommendations = []
         for error in TARGET_ERRORS:
             try:
-                recommendations.append((error, self.recommended(error)))
+                recommendations.append((error, self.recommend(error)))
             except MstmmError:
                 break
         return recommendations
@@ -75,19 +75,19 @@ class ChartRecord:
         """All data as plain values, as in chart.json."""
         best, why = None, None
         try:
-            best = self.recommended().to_dict()
+            best = self.recommend().to_dict()
         except MstmmError as problem:
             why = str(problem)
         return {
-            "scene": self.title, "t_end": self.t_end, "samples": self.samples, "times": self.looked,
-            "reference": self.reference.to_dict(),
+            "scene": self.title, "t_end": self.t_end, "samples": self.samples,
+            "times": self.sampling_text, "reference": self.reference.to_dict(),
             "points": [point.to_dict() for point in self.points],
-            "front": [point.to_dict() for point in self.front],
-            "recommended": best, "recommended_for": self.wanted, "not_recommended": why,
-            "advice": [{"asked": e, **point.to_dict()} for e, point in self.advice()],
-            "models": [level.to_dict() for level in self.levels],
-            "left_out": [skipped.to_dict() for skipped in self.left_out],
-            "warnings": list(self.warnings), "budget_s": self.budget, "spent_s": self.spent,
+            "front": [point.to_dict() for point in self.pareto_front], "recommended": best,
+            "recommended_for": self.target_error, "not_recommended": why,
+            "advice": [{"asked": e, **point.to_dict()} for e, point in self.recommendations()],
+            "models": [level.to_dict() for level in self.model_levels],
+            "left_out": [skipped.to_dict() for skipped in self.skipped],
+            "warnings": list(self.warnings), "budget_s": self.budget, "spent_s": self.elapsed,
         }  # fmt: skip
 
     def to_json(self) -> str:

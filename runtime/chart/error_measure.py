@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ..result.result_record import Record
 
 
-class Places(Measure):
+class PositionMeasure(Measure):
     """Positions of all bodies and ends, relative to the scene length; for any level.
 
     Flexible bodies are compared at their ends only: the position of the floating frame depends on
@@ -30,21 +30,23 @@ class Places(Measure):
     def __init__(self, model: CompiledScene, start: Result) -> None:
         self._length, scene = scene_length_with_ends(model), model.scene
         suffix, floating = ".position", {body.name for body in (*scene.beam, *scene.elastic)}
-        names = [name.removesuffix(suffix) for name in start.names() if name.endswith(suffix)]
+        names = [
+            name.removesuffix(suffix) for name in start.quantity_names() if name.endswith(suffix)
+        ]
         self._names = [name for name in names if name not in floating]
         self.scaling = f"relative to the length of the scene, {self._length:g} m"
 
     def read(self, result: Record) -> Array:
         return np.hstack([result.position(name) for name in self._names])
 
-    def apart(self, a: Array, b: Array) -> Array:
+    def distance(self, a: Array, b: Array) -> Array:
         displacements = (a - b).reshape(len(a), -1, 3)
         return np.asarray(np.linalg.norm(displacements, axis=2).max(axis=1) / self._length)
 
 
 def scene_length_with_ends(model: CompiledScene) -> float:
     """Length of a scene, m, including the ends of its flexible bodies."""
-    ports = [port for body in model.flexible.values() for port in body.ports.values()]
+    ports = [port for body in model.flexible_bodies.values() for port in body.ports.values()]
     return max([scene_length(model), *(float(np.linalg.norm(port.position)) for port in ports)])
 
 
@@ -58,4 +60,4 @@ def select_measure(
     """
     if names:
         return Quantities(start, names)
-    return Places(model, start) if models else Coordinates(model)
+    return PositionMeasure(model, start) if models else Coordinates(model)

@@ -27,8 +27,8 @@ _MERGE_FRACTION = 1e-12
 class Times:
     """Times of samples (n,), s, and a description of their distribution."""
 
-    at: Array
-    words: str
+    times: Array
+    description: str
 
 
 def equidistant_times(t_end: float, count: int) -> Times:
@@ -41,17 +41,17 @@ def refine_times(times: Times, steps: Array) -> Times:
 
     Additional times beyond the largest number allowed are thinned out evenly.
     """
-    first, last = times.at[0], times.at[-1]
+    first, last = times.times[0], times.times[-1]
     min_distance = _MERGE_FRACTION * (last - first)
     inside = steps[(steps > first) & (steps < last)]
-    interval = np.searchsorted(times.at, inside) - 1
-    is_fast = np.bincount(interval, minlength=len(times.at)) >= _FAST_STEP_COUNT
-    distances = np.minimum(inside - times.at[interval], times.at[interval + 1] - inside)
+    interval = np.searchsorted(times.times, inside) - 1
+    is_fast = np.bincount(interval, minlength=len(times.times)) >= _FAST_STEP_COUNT
+    distances = np.minimum(inside - times.times[interval], times.times[interval + 1] - inside)
     added = np.unique(inside[is_fast[interval] & (distances > min_distance)])
-    max_count = (_MAX_COUNT_FACTOR - 1) * len(times.at)
+    max_count = (_MAX_COUNT_FACTOR - 1) * len(times.times)
     if len(added) > max_count:
         added = added[np.linspace(0, len(added) - 1, max_count).round().astype(int)]
     if not len(added):
         return times
-    words = f"{times.words}, and {len(added)} more where the motion is fast"
-    return Times(np.union1d(times.at, added), words)
+    words = f"{times.description}, and {len(added)} more where the motion is fast"
+    return Times(np.union1d(times.times, added), words)

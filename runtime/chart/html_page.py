@@ -72,7 +72,8 @@ def page(chart: ChartRecord) -> str:
         f"<h1>{escape(escape_control_characters(drawing.title))}: work-precision chart</h1>",
         f'<p class="soft">{escape(_conditions(chart))}</p>',
         f'<p class="soft">Reference: {escape(reference.made_by)}. Its own error is '
-        f"{reference.error:.1e}; errors below {reference.floor:.1e} are not resolved. Scaling: "
+        f"{reference.error:.1e}; errors below {reference.smallest_resolved_error:.1e} are not "
+        f"resolved. Scaling: "
         f"{escape(escape_control_characters(reference.scaling))}.</p>",
         *(f"<p>{escape(escape_control_characters(text))}</p>" for text in _scene_notes(chart)),
         '<div class="chart"><div class="plane">', chart_svg(drawing, keys), "</div>",
@@ -86,13 +87,13 @@ def page(chart: ChartRecord) -> str:
     text = recommendation(chart)
     text = text[:1].upper() + text[1:]
     body += ["<h2>Recommended settings</h2>", f"<p>{escape(escape_control_characters(text))}</p>"]
-    if chart.advice():
+    if chart.recommendations():
         body.append(_table_html(recommendation_table(chart)))
-    if len(chart.levels) > 1:
+    if len(chart.model_levels) > 1:
         body += ["<h2>Model levels</h2>", _table_html(level_table(chart))]
     body += [
         "<h2>All runs</h2>", f"<details><summary>{len(chart.points)} settings</summary>",
-        _table_html(point_table(chart)), "</details>", _skipped_html(chart.left_out),
+        _table_html(point_table(chart)), "</details>", _skipped_html(chart.skipped),
     ]  # fmt: skip
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8"/>\n'
@@ -110,18 +111,19 @@ def _conditions(chart: ChartRecord) -> str:
     return (
         f"{chart.t_end:g} s of motion. Error: largest error of "
         f"{escape_control_characters(chart.reference.measure)}"
-        f"{unit} over {chart.looked}. Time: CPU time of the whole call of simulate, the "
-        f"smallest of several. Computed in {chart.spent:.0f} s of a budget of {chart.budget:g} s. "
+        f"{unit} over {chart.sampling_text}. Time: CPU time of the whole call of simulate, the "
+        f"smallest of several. Computed in {chart.elapsed:.0f} s of a budget of {chart.budget:g} "
+        f"s. "
         "Hover over a point or a name of the legend for details."
     )
 
 
 def _scene_notes(chart: ChartRecord) -> list[str]:
     """Notes that hold for all runs: early end, no motion, warnings of the scene."""
-    ended = chart.reference.ended
+    ended = chart.reference.stop_event
     notes = [f"Runs end before {chart.t_end:g} s: {ended}."] if ended else []
-    if chart.reference.still:
-        notes.append("Nothing moves in this scene: no methods are compared.")
+    if chart.reference.is_static:
+        notes.append("The scene has no degrees of freedom: no methods are compared.")
     return [*notes, *(f"Warning: {text}" for text in chart.warnings)]
 
 
@@ -129,14 +131,14 @@ def _legend(entries: Sequence[Entry], keys: dict[str, int]) -> str:
     items = []
     for entry in entries:
         text = escape(escape_control_characters(entry.text))
-        if entry.look is None:
+        if entry.style is None:
             items.append(f'<li class="{"head" if entry.strong else "note"}">{text}</li>')
             continue
         key = f" e{keys[entry.text]}" if entry.text in keys else ""
-        shape = marker_svg(entry.look, 7, 7, 5)
+        shape = marker_svg(entry.style, 7, 7, 5)
         items.append(
             f'<li class="{"strong" if entry.strong else "faint"}{key}"><svg viewBox="0 0 14 14" '
-            f'fill="{entry.look.colour}">{shape}</svg>{text}</li>'
+            f'fill="{entry.style.colour}">{shape}</svg>{text}</li>'
         )
     return f'<ul class="keys">{"".join(items)}</ul>'
 

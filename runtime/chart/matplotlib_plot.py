@@ -80,23 +80,31 @@ def _draw_axes(axes: Any, drawing: Drawing) -> None:
             drawing.floor, 0.985, " not resolved by the reference", fontsize=7, color="#777777",
             va="top", ha="left", rotation=90, transform=axes.get_xaxis_transform(),
         )  # fmt: skip
-    if len(drawing.front) > 1:
-        axes.plot(*zip(*drawing.front, strict=True), color="#111111", lw=7, alpha=0.16,
+    if len(drawing.pareto_front) > 1:
+        axes.plot(*zip(*drawing.pareto_front, strict=True), color="#111111", lw=7, alpha=0.16,
                   solid_capstyle="round", solid_joinstyle="round", zorder=3)  # fmt: skip
     for line in drawing.lines:
         positions = [position for position, _ in line.points]
         axes.plot(
-            *zip(*positions, strict=True), color=line.look.colour, marker=line.look.mark or "None",
-            ls="-" if line.joined else "None", lw=1.7 if line.strong else 0.8,
-            ms=5 if line.strong else 3, mec="white", mew=0.5, alpha=1.0 if line.strong else 0.55,
-            zorder=5 if line.strong else 2, clip_on=True,
+            *zip(*positions, strict=True), color=line.style.colour,
+            marker=line.style.mark or "None", ls="-" if line.is_connected else "None",
+            lw=1.7 if line.is_emphasised else 0.8, ms=5 if line.is_emphasised else 3, mec="white",
+            mew=0.5, alpha=1.0 if line.is_emphasised else 0.55,
+            zorder=5 if line.is_emphasised else 2, clip_on=True,
         )  # fmt: skip
-    if drawing.front:
-        axes.plot(*zip(*drawing.front, strict=True), "o", ms=9, mfc="none", mec="#111111", mew=0.9,
-                  zorder=6)  # fmt: skip
+    if drawing.pareto_front:
+        axes.plot(
+            *zip(*drawing.pareto_front, strict=True),
+            "o",
+            ms=9,
+            mfc="none",
+            mec="#111111",
+            mew=0.9,
+            zorder=6,
+        )
     for label in drawing.labels:
         axes.annotate(
-            label.text, label.place, (label.at[0], -label.at[1]), textcoords="offset points",
+            label.text, label.position, (label.at[0], -label.at[1]), textcoords="offset points",
             ha="center", va="center", fontsize=8, zorder=7,
             bbox={"boxstyle": "round,pad=0.12", "fc": "white", "ec": "none", "alpha": 0.6},
         )  # fmt: skip
@@ -115,7 +123,7 @@ def _draw_legend(figure: Any, entries: Sequence[Entry], height: float) -> None:
     """Draw the legend at the right: headings with names below."""
     for i, entry in enumerate(entries):
         y = 1 - (0.70 + _ROW * i) / height
-        if entry.look is None:
+        if entry.style is None:
             look: dict[str, Any] = {"weight": "bold"} if entry.strong else {"color": "#666666"}
             figure.text(
                 0.785 if entry.strong else 0.826,
@@ -131,8 +139,8 @@ def _draw_legend(figure: Any, entries: Sequence[Entry], height: float) -> None:
 
         shade = 1.0 if entry.strong else 0.6
         figure.add_artist(Line2D(
-            [0.792, 0.805, 0.818], [y] * 3, color=entry.look.colour, lw=1.3, alpha=shade,
-            marker=entry.look.mark, markevery=[1], ms=5, mec="white", mew=0.4,
+            [0.792, 0.805, 0.818], [y] * 3, color=entry.style.colour, lw=1.3, alpha=shade,
+            marker=entry.style.mark, markevery=[1], ms=5, mec="white", mew=0.4,
         ))  # fmt: skip
         figure.text(0.826, y, escape_control_characters(entry.text), fontsize=8, va="center",
                     color="#111111" if entry.strong else "#666666", parse_math=False)  # fmt: skip

@@ -36,20 +36,20 @@ _LEVEL_ERROR_FACTOR = 1.1
 class Curve:
     """Curve of a chart: a method on a model level, its remaining settings, and costs so far.
 
-    The curve ends at the error `enough`: the smallest one that the reference resolves, or the error
-    of the model level; `why_enough` states which.  `costs` are CPU times, s.
+    The curve ends at the error `sufficient_error`: the smallest one that the reference resolves, or
+    the error of the model level; `sufficiency_reason` states which.  `costs` are CPU times, s.
     """
 
     method: str
     level: str
     model: Model
-    enough: float
-    why_enough: str
-    ahead: Iterator[Setting]
+    sufficient_error: float
+    sufficiency_reason: str
+    next_settings: Iterator[Setting]
     costs: list[float] = field(default_factory=list)
 
     @property
-    def expected(self) -> float:
+    def expected_seconds(self) -> float:
         """Estimated CPU time of the next setting, s; 0 if unknown."""
         if not self.costs:
             return 0.0
@@ -79,38 +79,38 @@ class SurveyResult:
 
     points: list[Point] = field(default_factory=list)
     models: list[Model] = field(default_factory=list)
-    left_out: list[Skipped] = field(default_factory=list)
+    skipped: list[Skipped] = field(default_factory=list)
 
 
 class Survey:
-    """Run of all curves within a time budget; collects points in `found`."""
+    """Run of all curves within a time budget; collects points in `result`."""
 
     def __init__(
         self, reference: Trial, measure: Measure, runs: Runs, tell: Callable[[str], None]
     ) -> None:
-        self.reference, self.measure, self.runs, self.tell = reference, measure, runs, tell
-        self.found = SurveyResult()
+        self.reference, self.measure, self.runs, self.report = reference, measure, runs, tell
+        self.result = SurveyResult()
 
-    def make(self, curves: list[Curve], part: float) -> SurveyResult:
+    def run_curves(self, curves: list[Curve], part: float) -> SurveyResult:
         """Run all curves, one setting of each in turn, until this part of the budget is spent."""
         while curves:
             waiting = len(curves)
             curves = [
                 curve
                 for curve in curves
-                if self._run_next(curve, self.runs.budget.share(part, waiting))
+                if self._run_next(curve, self.runs.budget.run_limit(part, waiting))
             ]
-        return self.found
+        return self.result
 
     def _run_next(self, curve: Curve, limit: float) -> bool:
         """Run the next setting of a curve within `limit` s; return False if the curve ends."""
-        setting = next(curve.ahead, None)
+        setting = next(curve.next_settings, None)
         if setting is None:
             return False
-        if not limit or curve.expected > limit:
+        if not limit or curve.expected_seconds > limit:
             self._skip(curve, f"{setting} and tighter", _NO_TIME)
             return False
-        self.tell(f"{curve.level}: {curve.method}, {setting}")
+        self.report(f"{curve.level}: {curve.method}, {setting}")
         trial = self.runs.trial(curve.model, setting, self.measure, limit)
         if (
             not curve.costs
@@ -123,21 +123,21 @@ class Survey:
             self._skip(curve, "", trial.failure, refused=True)
             return False
         point = chart_point(trial, self.reference, self.measure)
-        self.found.points.append(point)
-        self.found.models.append(curve.model)
+        self.result.points.append(point)
+        self.result.models.append(curve.model)
         return not (trial.late or self._is_accurate_enough(curve, point))
 
     def _is_accurate_enough(self, curve: Curve, point: Point) -> bool:
         """Whether tighter settings cannot show smaller errors; skips the next one if so."""
-        if point.error is None or point.error > curve.enough:
+        if point.error is None or point.error > curve.sufficient_error:
             return False
-        following = next(curve.ahead, None)
+        following = next(curve.next_settings, None)
         if following is not None:
-            self._skip(curve, f"{following} and tighter", curve.why_enough)
+            self._skip(curve, f"{following} and tighter", curve.sufficiency_reason)
         return True
 
     def _skip(self, curve: Curve, setting: str, reason: str, refused: bool = False) -> None:
-        self.found.left_out.append(Skipped(curve.method, curve.level, setting, reason, refused))
+        self.result.skipped.append(Skipped(curve.method, curve.level, setting, reason, refused))
 
 
 def _may_include_loading(trial: Trial, model: Model) -> bool:
@@ -156,5 +156,5 @@ def chart_point(trial: Trial, reference: Trial, measure: Measure) -> Point:
         trial.setting, error, trial.cpu_s, 1,
         None if counts is None else counts.evaluations, factorization_count(trial.setting, counts),
         None if counts is None else counts.steps,
-        warnings=trial.warnings, too_coarse=trial.too_coarse,
+        warnings=trial.warnings, is_too_coarse=trial.too_coarse,
     )  # fmt: skip

@@ -39,8 +39,8 @@ def bound_errors(
             and other.error is not None
         )  # fmt: skip
         bound = max(bound, (level_errors or {}).get(point.setting.model, 0.0))
-        limited = point.error <= reference.floor
-        bounded.append(replace(point, sure_error=bound, limited=limited))
+        limited = point.error <= reference.smallest_resolved_error
+        bounded.append(replace(point, error_bound=bound, reference_limited=limited))
     return tuple(bounded)
 
 
@@ -68,7 +68,7 @@ def pareto_front(points: Iterable[Point], floor: float = 0.0) -> tuple[Point, ..
         (
             p
             for p in points
-            if p.sure_error is not None and p.cpu_s is not None and not p.too_coarse
+            if p.error_bound is not None and p.cpu_s is not None and not p.is_too_coarse
         ),
         key=lambda p: (p.cpu_s, _resolved_error(p, floor)),
     ):
@@ -78,8 +78,8 @@ def pareto_front(points: Iterable[Point], floor: float = 0.0) -> tuple[Point, ..
 
 
 def _resolved_error(point: Point, floor: float) -> float:
-    assert point.sure_error is not None
-    return max(point.sure_error, floor)
+    assert point.error_bound is not None
+    return max(point.error_bound, floor)
 
 
 def recommend(points: Sequence[Point], error: float, reference: Reference) -> Point:
@@ -90,15 +90,15 @@ def recommend(points: Sequence[Point], error: float, reference: Reference) -> Po
     """
     if not finite_float("error", error, _EXPECTED) > 0:
         raise SceneError(f"error = {error!r}: expected {_EXPECTED}")
-    if reference.still:
+    if reference.is_static:
         raise NumericalFailure(
-            "nothing moves in this scene: all settings give the same result, there is nothing to "
+            "the scene has no degrees of freedom: all settings give the same result, nothing to "
             "recommend"
         )
-    if error < reference.floor:
+    if error < reference.smallest_resolved_error:
         raise NumericalFailure(
             f"error of the reference up to {reference.error:.1e}: it does not resolve errors below "
-            f"{reference.floor:.1e}; give a larger target error"
+            f"{reference.smallest_resolved_error:.1e}; give a larger target error"
         )
     errors = [point.error for point in points if point.error is not None]
     if errors and not any(errors):
@@ -106,11 +106,13 @@ def recommend(points: Sequence[Point], error: float, reference: Reference) -> Po
             f"all runs have zero error of {reference.measure}, which does not change in this "
             "motion; compare another quantity"
         )
-    front = pareto_front(points, reference.floor)
+    front = pareto_front(points, reference.smallest_resolved_error)
     for point in front:
-        if point.sure_error is not None and point.sure_error <= error:
+        if point.error_bound is not None and point.error_bound <= error:
             return point
-    best = f"; the smallest error reached is {front[-1].sure_error:.1e}" if front else ""
-    if any(p.too_coarse and p.sure_error is not None and p.sure_error <= error for p in points):
+    best = f"; the smallest error reached is {front[-1].error_bound:.1e}" if front else ""
+    if any(
+        p.is_too_coarse and p.error_bound is not None and p.error_bound <= error for p in points
+    ):
         best += "; runs with smaller errors have a fixed step too long for the fastest motion"
     raise NumericalFailure(f"no setting reaches an error of {error:.1e}{best}")

@@ -51,7 +51,7 @@ def planar_level(richest: Variant, model: CompiledScene, q: Array) -> Variant | 
 
 def _planar_beam(model: CompiledScene, beam: Beam, modes: Modes, q: Array) -> Beam:
     """A beam without shapes in directions in which it stays undeformed; rigid if none is left."""
-    slots = model.layout.modal[beam.name]
+    slots = model.coordinate_layout.modal[beam.name]
     sizes = np.abs(q[:, slots.q_slice]).max(axis=0)
     moving_directions = {
         name.rstrip("0123456789")
@@ -80,7 +80,7 @@ def _planar_hinge(model: CompiledScene, hinge: Hinge, q: Array) -> Hinge | None:
     if hinge.drive is not None or hinge.initial is None or hinge.initial.q is None:
         return None
     lawless = Hinge(name="lawless", type=hinge.type, inboard="ground", outboard=hinge.outboard)
-    hinge_q = q[:, model.layout.hinges[hinge.name].q_slice]
+    hinge_q = q[:, model.coordinate_layout.hinges[hinge.name].q_slice]
     axis = _common_axis(hinge_q[:, properties.quaternion + 1 :])
     initial_u = np.array(hinge.initial.u or (0.0,) * len(properties.speeds))
     if hinge.law != lawless.law or axis is None or not _is_parallel(initial_u[-3:], axis):

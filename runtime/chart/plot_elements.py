@@ -16,7 +16,7 @@ from .method_families import FAMILIES, family
 from .pareto_front import pareto_front
 from .plot_styles import PlotStyle, family_mark, level_colours, method_styles
 
-Place = tuple[float, float]
+Position = tuple[float, float]
 
 #: Points with an error above this many times the median error of the first points of all curves are
 #: outside the plot.
@@ -40,21 +40,21 @@ _LABEL_OFFSETS = (
 
 @dataclass(frozen=True)
 class Line:
-    """Points with the same style; `joined` by a line, and `strong` if emphasised."""
+    """Points with the same style; `is_connected` by a line, and `is_emphasised` if emphasised."""
 
     name: str
-    look: PlotStyle
-    points: tuple[tuple[Place, Point], ...]
-    joined: bool
-    strong: bool
+    style: PlotStyle
+    points: tuple[tuple[Position, Point], ...]
+    is_connected: bool
+    is_emphasised: bool
 
 
 @dataclass(frozen=True)
 class Label:
-    """Text near the point at `place`; its centre is offset by `at` (right, down), in 1/72 in."""
+    """Text near the point at `position`; its centre is offset by `at` (right, down), in 1/72 in."""
 
     text: str
-    place: Place
+    position: Position
     at: tuple[float, float]
 
 
@@ -63,7 +63,7 @@ class Entry:
     """Row of the legend: a name with a style; without style a heading if `strong`, else a note."""
 
     text: str
-    look: PlotStyle | None = None
+    style: PlotStyle | None = None
     strong: bool = True
 
 
@@ -74,7 +74,7 @@ class Drawing:
     x: tuple[float, float]
     y: tuple[float, float]
     lines: list[Line]
-    front: list[Place]
+    pareto_front: list[Position]
     floor: float
     labels: list[Label]
     legend: list[Entry]
@@ -95,11 +95,11 @@ def build_drawing(chart: ChartRecord) -> Drawing:
         id(p): position for p in chart.points if (position := plot_position(p)) is not None
     }
     shown = [p for p in chart.points if id(p) in positions]
-    x, y = _limits(shown, positions, chart.reference.floor)
+    x, y = _limits(shown, positions, chart.reference.smallest_resolved_error)
     kept = [p for p in shown if positions[id(p)][0] <= x[0] + 1e-9]
-    levels = [level.name for level in chart.levels]
+    levels = [level.name for level in chart.model_levels]
     has_levels = len(levels) > 1
-    front = [p for p in chart.front if id(p) in positions and p in kept]
+    front = [p for p in chart.pareto_front if id(p) in positions and p in kept]
     lines = (
         _level_lines(kept, positions, levels, chart)
         if has_levels
@@ -111,16 +111,16 @@ def build_drawing(chart: ChartRecord) -> Drawing:
     reference = chart.reference
     unit = "" if reference.unit == "1" else f" in {reference.unit}"
     return Drawing(
-        x, y, lines, front_positions,
-        math.log10(reference.floor) if reference.floor > 0 else -math.inf,
-        _labels(front_positions, front_names, x, y), _legend(lines, chart.points, levels),
-        chart.title or "work-precision chart",
+        x, y, lines, front_positions, math.log10(reference.smallest_resolved_error)
+        if reference.smallest_resolved_error > 0
+        else -math.inf, _labels(front_positions, front_names, x, y),
+        _legend(lines, chart.points, levels), chart.title or "work-precision chart",
         _subtitle(chart),
         f"largest error of {reference.measure}{unit}" + ("" if unit else " (scaled)"),
         beyond=len(shown) - len(kept), empty=_empty_reason(chart, shown),
         own=[
             (math.log10(level.error), colours[level.name], level.name)
-            for level in chart.levels
+            for level in chart.model_levels
             if has_levels and level.error and level.name != reference.model
         ],
     )  # fmt: skip
@@ -129,7 +129,7 @@ def build_drawing(chart: ChartRecord) -> Drawing:
 def _subtitle(chart: ChartRecord) -> str:
     """Simulated time and reference of a chart."""
     reference = chart.reference
-    until = f", {reference.ended}" if reference.ended else ""
+    until = f", {reference.stop_event}" if reference.stop_event else ""
     return (
         f"{chart.t_end:g} s of motion{until}; reference: {reference.made_by}, its own error "
         f"{reference.error:.1e}"
@@ -140,13 +140,13 @@ def _empty_reason(chart: ChartRecord, shown: Sequence[Point]) -> str:
     """Reason why there is nothing to plot, "" if there is something."""
     if shown:
         return ""
-    if chart.reference.still:
-        return "nothing moves in this scene"
+    if chart.reference.is_static:
+        return "the scene has no degrees of freedom"
     errors = [point.error for point in chart.points if point.error is not None]
     return "no run has an error above zero" if errors else "no run was completed"
 
 
-def plot_position(point: Point) -> Place | None:
+def plot_position(point: Point) -> Position | None:
     """(log10 error, log10 s); None for a failed run, or without error or CPU time above 0."""
     if not point.error or not point.cpu_s:
         return None
@@ -154,8 +154,8 @@ def plot_position(point: Point) -> Place | None:
 
 
 def _limits(
-    shown: Sequence[Point], positions: dict[int, Place], floor: float
-) -> tuple[Place, Place]:
+    shown: Sequence[Point], positions: dict[int, Position], floor: float
+) -> tuple[Position, Position]:
     """Limits (x, y) of the axes; `floor` is the smallest error that the reference resolves."""
     if not shown:
         return (0.0, -12.0), (-4.0, 0.0)
@@ -178,7 +178,7 @@ def _limits(
 
 
 def _method_lines(
-    points: Sequence[Point], positions: dict[int, Place], front: Sequence[Point]
+    points: Sequence[Point], positions: dict[int, Position], front: Sequence[Point]
 ) -> list[Line]:
     """One line per method; methods with a point on the Pareto front are strong."""
     methods = _sorted_by_family(p.method for p in points)
@@ -187,15 +187,18 @@ def _method_lines(
     for method in methods:
         path = tuple((positions[id(p)], p) for p in points if p.method == method)
         lines.append(Line(method, styles[method], path, True, method in strong_methods))
-    return sorted(lines, key=lambda line: line.strong)
+    return sorted(lines, key=lambda line: line.is_emphasised)
 
 
 def _level_lines(
-    points: Sequence[Point], positions: dict[int, Place], levels: Sequence[str], chart: ChartRecord
+    points: Sequence[Point],
+    positions: dict[int, Position],
+    levels: Sequence[str],
+    chart: ChartRecord,
 ) -> list[Line]:
     """Per model level: faint lines of its methods, and its own Pareto front as a strong line."""
     colours, lines = level_colours(levels), []
-    level_errors = {level.name: 1.1 * (level.error or 0.0) for level in chart.levels}
+    level_errors = {level.name: 1.1 * (level.error or 0.0) for level in chart.model_levels}
     level_errors[chart.reference.model] = 0.0
     for curve in dict.fromkeys(p.curve for p in points):
         path = tuple((positions[id(p)], p) for p in points if p.curve == curve)
@@ -203,7 +206,7 @@ def _level_lines(
     for strong in (False, True):
         for level in levels:
             level_points = [p for p in points if p.model == level]
-            floor = max(level_errors[level], chart.reference.floor)
+            floor = max(level_errors[level], chart.reference.smallest_resolved_error)
             front_ids = {id(p) for p in pareto_front(level_points, floor)}
             for mark in dict.fromkeys(family_mark(p.method) for p in level_points):
                 marked = tuple(
@@ -225,13 +228,15 @@ def _sorted_by_family(methods: Iterable[str]) -> list[str]:
     return sorted(names, key=lambda name: FAMILIES.index(family(name)))
 
 
-def _labels(positions: Sequence[Place], names: Sequence[str], x: Place, y: Place) -> list[Label]:
+def _labels(
+    positions: Sequence[Position], names: Sequence[str], x: Position, y: Position
+) -> list[Label]:
     """Labels where the method (or level) of the Pareto front changes, if there is free space.
 
     A name is repeated only far from its previous label.
     """
 
-    def plot_coordinates(position: Place) -> Place:
+    def plot_coordinates(position: Position) -> Position:
         right = (position[0] - x[0]) / (x[1] - x[0]) * _PLOT_SIZE[0]
         return right, (y[1] - position[1]) / (y[1] - y[0]) * _PLOT_SIZE[1]
 
@@ -294,7 +299,7 @@ def _legend(lines: Sequence[Line], points: Sequence[Point], levels: Sequence[str
         if heading not in entries:
             entries.append(heading)
         line = line_by_method[method]
-        entries.append(Entry(method, line.look, line.strong))
+        entries.append(Entry(method, line.style, line.is_emphasised))
     return entries
 
 

@@ -98,7 +98,9 @@ def _run_candidate(
     trials: list[Trial] = []
     for tolerance in tolerances:
         setting = Setting(method, name, tolerance)
-        limit = runs.budget.left(REFERENCE) / 2  # the other half leaves time for another method
+        limit = (
+            runs.budget.remaining(REFERENCE) / 2
+        )  # the other half leaves time for another method
         if trials and _GROWTH * trials[-1].cpu_s > limit:
             return trials, f"{setting} would take too long", True
         report(f"reference by {method}, {setting}")
@@ -111,7 +113,7 @@ def _run_candidate(
 
 def _select_reference(trials_by_method: Mapping[str, list[Trial]], measure: Measure) -> Converged:
     """Run that agrees best with a looser run of its method and with another method."""
-    measure.scale_by(_measured_values(next(iter(trials_by_method.values()))[-1]))
+    measure.set_scales(_measured_values(next(iter(trials_by_method.values()))[-1]))
     candidates = []
     for method, trials in trials_by_method.items():
         run, looser = trials[-1], trials[-2]
@@ -127,7 +129,7 @@ def _select_reference(trials_by_method: Mapping[str, list[Trial]], measure: Meas
     if not np.isfinite(error):
         raise NumericalFailure("no reference was found: the runs end at different times")
     run, looser = trials_by_method[method][-1], trials_by_method[method][-2]
-    measure.scale_by(_measured_values(run))
+    measure.set_scales(_measured_values(run))
     text = f"{method} with {run.setting}, compared with {looser.setting}"
     text += f" and with {partner}, {trials_by_method[partner][-1].setting}" if partner else " only"
     return Converged(run, error, text)

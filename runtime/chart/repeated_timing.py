@@ -22,11 +22,7 @@ _ROUND_CPU_S, _MAX_CALLS = 5e-3, 5
 
 
 def repeat_timings(
-    points: list[Point],
-    models: list[Model],
-    rounds: int,
-    runs: Runs,
-    report: Callable[[str], None],
+    points: list[Point], models: list[Model], rounds: int, runs: Runs, report: Callable[[str], None]
 ) -> tuple[list[Point], int]:
     """Repeat the timing of points; return them, and how many missed at least one round.
 
@@ -34,14 +30,14 @@ def repeat_timings(
     that no longer fit into the budget; very long runs are not repeated.
     """
     timed = list(points)
-    longest = runs.budget.left() / _MIN_RUNS
+    longest = runs.budget.remaining() / _MIN_RUNS
     times = {i: point.cpu_s for i, point in enumerate(points) if point.cpu_s is not None}
     order = sorted((i for i in times if times[i] <= longest), key=lambda i: (times[i], i))
     missed: set[int] = set()
     for number in range(rounds):
         report(f"repeat timings, round {number + 1} of {rounds}")
         remaining = rounds - number
-        reserved = runs.budget.left() * (remaining - 1) / remaining  # for the later rounds
+        reserved = runs.budget.remaining() * (remaining - 1) / remaining  # for the later rounds
         missed |= {i for i in order if not _time_point(timed, i, models[i], runs, reserved)}
     return timed, len(missed) + len(times) - len(order)
 
@@ -50,7 +46,7 @@ def _time_point(timed: list[Point], i: int, model: Model, runs: Runs, reserved: 
     """Time point i again; return False if that would use the reserved time (s)."""
     point = timed[i]
     assert point.cpu_s is not None
-    left, once = runs.budget.left() - reserved, max(point.cpu_s, 1e-6)
+    left, once = runs.budget.remaining() - reserved, max(point.cpu_s, 1e-6)
     calls = max(1, min(_MAX_CALLS, int(_ROUND_CPU_S / once)))
     if calls * once > left:
         return False

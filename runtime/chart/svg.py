@@ -5,7 +5,7 @@ from __future__ import annotations
 from html import escape
 
 from .chart_points import Point
-from .plot_elements import Drawing, Line, Place, decades, time_text
+from .plot_elements import Drawing, Line, Position, decades, time_text
 from .plot_styles import MARKS, PlotStyle
 from .tables import format_time, point_notes
 
@@ -22,7 +22,7 @@ class Plane:
     def __init__(self, drawing: Drawing) -> None:
         self.x, self.y = drawing.x, drawing.y
 
-    def at(self, place: Place) -> Place:
+    def to_svg(self, place: Position) -> Position:
         """SVG coordinates (x to the right, y down)."""
         right = (place[0] - self.x[0]) / (self.x[1] - self.x[0])
         down = (self.y[1] - place[1]) / (self.y[1] - self.y[0])
@@ -48,21 +48,23 @@ def chart_svg(drawing: Drawing, keys: dict[str, int]) -> str:
         *_axes_svg(drawing, plane),
         '<g clip-path="url(#plane)">',
     ]
-    if len(drawing.front) > 1:
-        parts.append(f'<polyline class="front" points="{_path_points(plane, drawing.front)}"/>')
+    if len(drawing.pareto_front) > 1:
+        parts.append(
+            f'<polyline class="front" points="{_path_points(plane, drawing.pareto_front)}"/>'
+        )
     parts += [_line_svg(line, plane, keys[line.name]) for line in drawing.lines]
-    for position in drawing.front:
-        x, y = plane.at(position)
+    for position in drawing.pareto_front:
+        x, y = plane.to_svg(position)
         parts.append(f'<circle class="best" cx="{x:.1f}" cy="{y:.1f}" r="7.5"/>')
     for log_error, colour, name in drawing.own:
-        x, y = plane.at((log_error, drawing.y[0]))
+        x, y = plane.to_svg((log_error, drawing.y[0]))
         parts.append(
             f'<rect x="{x - 2:.1f}" y="{y - 14:.1f}" width="4" height="14" fill="{colour}">'
             f"<title>{escape(name)} has an error of {10**log_error:.2g}</title></rect>"
         )
     parts.append("</g>")
     for label in drawing.labels:
-        x, y = plane.at(label.place)
+        x, y = plane.to_svg(label.position)
         x, y = x + 1.3 * label.at[0], y + 1.3 * label.at[1] + 4
         parts.append(f'<text class="word" x="{x:.1f}" y="{y:.1f}">{escape(label.text)}</text>')
     return "\n".join([*parts, "</svg>"])
@@ -97,22 +99,22 @@ def tooltip_text(point: Point) -> str:
 
 
 def _axes_svg(drawing: Drawing, plane: Plane) -> list[str]:
-    left, top = plane.at((drawing.x[0], drawing.y[1]))
-    right, bottom = plane.at((drawing.x[1], drawing.y[0]))
+    left, top = plane.to_svg((drawing.x[0], drawing.y[1]))
+    right, bottom = plane.to_svg((drawing.x[1], drawing.y[0]))
     parts = []
     if drawing.floor > drawing.x[1]:
-        edge = plane.at((drawing.floor, drawing.y[1]))[0]
+        edge = plane.to_svg((drawing.floor, drawing.y[1]))[0]
         parts.append(
             f'<rect class="beyond" x="{edge:.1f}" y="{top:.1f}" width="{right - edge:.1f}" '
             f'height="{bottom - top:.1f}"><title>not resolved by the reference</title></rect>'
         )
     for power in decades(*drawing.x):
-        x = plane.at((power, drawing.y[0]))[0]
+        x = plane.to_svg((power, drawing.y[0]))[0]
         parts.append(f'<path class="grid" d="M{x:.1f} {top:.1f}V{bottom:.1f}"/>')
         sup = f'<tspan dy="-5" font-size="9">{power}</tspan>'
         parts.append(f'<text class="tick mid" x="{x:.1f}" y="{bottom + 17:.1f}">10{sup}</text>')
     for power in decades(*drawing.y):
-        y = plane.at((drawing.x[0], power))[1]
+        y = plane.to_svg((drawing.x[0], power))[1]
         parts.append(f'<path class="grid" d="M{left:.1f} {y:.1f}H{right:.1f}"/>')
         parts.append(
             f'<text class="tick end" x="{left - 6:.1f}" y="{y + 4:.1f}">{time_text(power)}</text>'
@@ -132,20 +134,20 @@ def _axes_svg(drawing: Drawing, plane: Plane) -> list[str]:
 
 
 def _line_svg(line: Line, plane: Plane, key: int) -> str:
-    strong = "strong" if line.strong else "faint"
-    parts = [f'<g class="{strong} k{key}" stroke="{line.look.colour}" fill="{line.look.colour}">']
-    if line.joined and len(line.points) > 1:
+    strong = "strong" if line.is_emphasised else "faint"
+    parts = [f'<g class="{strong} k{key}" stroke="{line.style.colour}" fill="{line.style.colour}">']
+    if line.is_connected and len(line.points) > 1:
         parts.append(
             f'<polyline points="{_path_points(plane, [position for position, _ in line.points])}"/>'
         )
-    if line.look.mark:
-        size = _STRONG_RADIUS if line.strong else _FAINT_RADIUS
+    if line.style.mark:
+        size = _STRONG_RADIUS if line.is_emphasised else _FAINT_RADIUS
         for position, point in line.points:
-            x, y = plane.at(position)
-            shape = marker_svg(line.look, x, y, size)
+            x, y = plane.to_svg(position)
+            shape = marker_svg(line.style, x, y, size)
             parts.append(f"<g>{shape}<title>{escape(tooltip_text(point))}</title></g>")
     return "".join([*parts, "</g>"])
 
 
-def _path_points(plane: Plane, positions: list[Place]) -> str:
-    return " ".join("{:.1f},{:.1f}".format(*plane.at(position)) for position in positions)
+def _path_points(plane: Plane, positions: list[Position]) -> str:
+    return " ".join("{:.1f},{:.1f}".format(*plane.to_svg(position)) for position in positions)

@@ -18,12 +18,12 @@ Table = tuple[Sequence[str], Sequence[int], Sequence[Sequence[str]]]
 
 def recommendation(chart: ChartRecord) -> str:
     """The cheapest setting for the target error, or why there is none."""
-    target = f"for an error of {chart.wanted:.2g}{_unit(chart)}"
+    target = f"for an error of {chart.target_error:.2g}{_unit(chart)}"
     try:
-        best = chart.recommended()
+        best = chart.recommend()
     except MstmmError as problem:
         return f"{target}: no recommendation: {problem}"
-    level = f" on the model level {best.model}" if len(chart.levels) > 1 else ""
+    level = f" on the model level {best.model}" if len(chart.model_levels) > 1 else ""
     warnings = "".join(f"; warning: {text}" for text in best.warnings)
     return (
         f"{target}: {best.method}, {best.setting}{level}, {format_time(best.cpu_s or 0.0)} CPU, "
@@ -39,7 +39,7 @@ def recommendation_table(chart: ChartRecord) -> Table:
             f"{target:.0e}", point.method, str(point.setting), point.model,
             format_time(point.cpu_s or 0.0), f"{point.error:.1e}", str(len(point.warnings) or ""),
         )
-        for target, point in chart.advice()
+        for target, point in chart.recommendations()
     ]  # fmt: skip
     return head, (0, 4, 5, 6), rows
 
@@ -52,7 +52,7 @@ def level_table(chart: ChartRecord) -> Table:
             level.name, "unknown" if level.error is None else f"{level.error:.1e}",
             str(level.degrees_of_freedom), level.engine,
         )
-        for level in chart.levels
+        for level in chart.model_levels
     ]  # fmt: skip
     return head, (1, 2), rows if len(rows) > 1 else []
 
@@ -77,7 +77,7 @@ def point_table(chart: ChartRecord) -> Table:
 
 def point_notes(point: Point) -> list[str]:
     """Notes on a run: limited by the reference, warnings."""
-    notes = [_LIMITED] if point.limited else []
+    notes = [_LIMITED] if point.reference_limited else []
     return [*notes, *(f"warning: {text}" for text in point.warnings)]
 
 
@@ -85,7 +85,7 @@ def skip_reasons(entries: Iterable[Skipped], refused: bool, max_count: int = 100
     """A sentence for each reason, with at most `max_count` of the methods that it applies to."""
     reasons: dict[str, dict[str, list[Skipped]]] = {}
     for entry in entries:
-        if entry.refused == refused:
+        if entry.is_unsupported == refused:
             reasons.setdefault(entry.reason, {}).setdefault(entry.method, []).append(entry)
     return [f"{_method_list(methods, max_count)}{reason}" for reason, methods in reasons.items()]
 

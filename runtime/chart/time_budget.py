@@ -34,17 +34,17 @@ class Budget:
         self._begin = self.clock()
 
     @property
-    def spent(self) -> float:
+    def elapsed(self) -> float:
         """Time since the creation, s."""
         return self.clock() - self._begin
 
-    def left(self, part: float = ALL) -> float:
+    def remaining(self, part: float = ALL) -> float:
         """Time until this fraction of the budget is spent, s, 0 or more."""
-        return max(0.0, part * self.seconds - self.spent)
+        return max(0.0, part * self.seconds - self.elapsed)
 
-    def share(self, part: float, waiting: int = 1) -> float:
+    def run_limit(self, part: float, waiting: int = 1) -> float:
         """Time limit of the next run, s, while `waiting` curves are not finished."""
-        return self.left(part) / max(_MIN_SHARES, waiting / _CURVES_PER_SHARE)
+        return self.remaining(part) / max(_MIN_SHARES, waiting / _CURVES_PER_SHARE)
 
     def alarm(self, seconds: float) -> Callable[[float, float], None]:
         """Progress callback for `simulate` that raises OutOfTime after `seconds`."""

@@ -16,6 +16,7 @@ from mstmm.scene import Scene
 from mstmm.scene.checks.flexible_bodies import short_beam_warnings
 
 from ..integrate.c_loop import Status
+from ..model.execution import Execution
 from ..platform_support.interrupts import record_interrupts
 from ..result.error_measure import Measure
 from ..result.one_way.result import OneWayResult
@@ -90,9 +91,9 @@ class Runs:
         With `own_steps` the samples are the integration steps.  Raises OutOfTime after `limit` s of
         wall-clock time, KeyboardInterrupt after an interrupt.
         """
-        return self.called(model, setting.options, limit, own_steps)
+        return self.simulate_with(model, setting.options, limit, own_steps)
 
-    def called(
+    def simulate_with(
         self, model: Model, options: Mapping[str, Any], limit: float, own_steps: bool = False
     ) -> tuple[Result, float]:
         """Simulate with any keyword arguments of `simulate`; otherwise as `simulate` above."""
@@ -100,7 +101,8 @@ class Runs:
         alarm = self.budget.alarm(limit)
         with record_interrupts() as interrupted:  # short runs do not check for it
             begin = time.process_time()
-            result = model.simulate(self.t_end, output_times=times, progress=alarm, **options)
+            execution = Execution(progress=alarm)
+            result = model.simulate(self.t_end, output_times=times, execution=execution, **options)
             if isinstance(result, OneWayResult) and result.is_comparable:
                 _ = result.cost  # computes the elastic response, which is part of the CPU time
             spent = time.process_time() - begin
@@ -145,7 +147,7 @@ def scene_warnings(scene: Scene) -> tuple[str, ...]:
 def _run_warnings(result: Result) -> tuple[tuple[str, ...], bool]:
     """Warnings of a run without those of its scene, and whether its fixed step is too long."""
     try:
-        warnings, step = result.warnings, result.certificate.step
+        warnings, step = result.warnings, result.certificate.step_stability
     except MstmmError as error:  # a quantity that is not available at any sample
         return (_truncate(str(error)),), False
     of_scene = scene_warnings(result.model.scene)
@@ -173,7 +175,7 @@ def max_error(trial: Trial, reference: Trial, measure: Measure) -> float | str:
     ):
         ends = [f"{run.t[-1]:.6g} s" if len(run.t) else "the start" for run in (trial, reference)]
         return f"the run ended at {ends[0]}, the reference at {ends[1]}"
-    return float(measure.apart(trial.numbers[:n], reference.numbers[:n]).max())
+    return float(measure.distance(trial.numbers[:n], reference.numbers[:n]).max())
 
 
 def _truncate(text: str) -> str:

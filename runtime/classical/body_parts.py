@@ -55,13 +55,13 @@ class Bending:
 class Attachment:
     """Attachment of a body to the part `parent` (-1: the ground).
 
-    Hinge point (3,) and hinge axes `turn` (3, 3) at rest in the frame of the parent, whose shapes
-    displace that point by `shapes` (3, n) and rotate it by `slopes` (3, n).
+    Hinge point (3,) and hinge axes `rotation` (3, 3) at rest in the frame of the parent, whose
+    shapes displace that point by `shapes` (3, n) and rotate it by `slopes` (3, n).
     """
 
     parent: int
     point: Array
-    turn: Array
+    rotation: Array
     shapes: Array
     slopes: Array
 
@@ -72,11 +72,11 @@ class Part:
 
     `hinge` is the place of the hinge in the engine's tree, `frame` the axes and origin of the body
     there.  `end` (3, 3) are the hinge's axes on the body at rest; the body's shapes rotate them by
-    `held` (3, n).
+    `section_rotation` (3, n).
     """
 
     hinge: int
-    hung: Attachment
+    attachment: Attachment
     kind: str
     springs: Springs | None
     frame: Probe
@@ -84,13 +84,13 @@ class Part:
     first: Array
     inertia: Array
     end: Array
-    held: Array
+    section_rotation: Array
     bending: Bending | None = None
 
     @property
     def parent(self) -> int:
         """Index of the part that carries it, -1 for the ground."""
-        return self.hung.parent
+        return self.attachment.parent
 
 
 def build_parts(packed: PackedScene) -> list[Part]:
@@ -128,7 +128,7 @@ class _PartBuilder:
             elif name not in passages:  # its inboard hinge is one of the scene
                 beam = name.removesuffix(f"/{HELD}")
                 body = self.expanded.bodies[beam]
-                port = body.ports[self.expanded.held[beam]]
+                port = body.ports[self.expanded.inboard_ends[beam]]
                 self.owner[place] = (len(self.origins), port)
                 yield self._beam(place, body, port)
             else:
@@ -141,7 +141,7 @@ class _PartBuilder:
         frame = Probe(place, (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
         return Part(
             place,
-            self._hung(place),
+            self._attachment(place),
             kind,
             springs,
             frame,
@@ -158,7 +158,7 @@ class _PartBuilder:
         placement = self.packed.placements[name]
         return name, np.array(placement.rotation), np.array(placement.origin)
 
-    def _hung(self, place: int) -> Attachment:
+    def _attachment(self, place: int) -> Attachment:
         parent = self.packed.topology.links[place].parent
         owner, port = self.owner[parent]
         connection = np.array(self.packed.system.body(place).connection)
@@ -176,7 +176,7 @@ class _PartBuilder:
 
     def _beam(self, place: int, body: ModalBody, port: ModalPort) -> Part:
         kind, springs = self.kinds[place]
-        attachment, bending = self._hung(place), _beam_shapes(body, port, self.packed)
+        attachment, bending = self._attachment(place), _beam_shapes(body, port, self.packed)
         self.origins.append(port.position)
         node, axes, _ = self._node(place)
         if node != body.name:  # the section, which turns with the beam
@@ -188,11 +188,11 @@ class _PartBuilder:
         second_moment = body.second - parallel_axis_terms
         inertia = np.trace(second_moment) * np.eye(3) - second_moment
         return Part(
-            place, attachment, kind, springs, self._floating(body, port), body.mass, first_moment,
-            inertia[np.triu_indices(3)], axes, port.theta, bending,
+            place, attachment, kind, springs, self._floating_frame(body, port), body.mass,
+            first_moment, inertia[np.triu_indices(3)], axes, port.theta, bending,
         )  # fmt: skip
 
-    def _floating(self, body: ModalBody, port: ModalPort) -> Probe:
+    def _floating_frame(self, body: ModalBody, port: ModalPort) -> Probe:
         """Axes of a beam, and the point of its floating frame at its inboard end at rest."""
         placement = self.packed.placements[body.name]
         x, y, z = (float(entry) for entry in port.position)

@@ -85,7 +85,7 @@ def _write_tree(bodies: CRecords, parents: Sequence[int]) -> None:
 
 def scene_size(parts: Sequence[Part]) -> float:
     """Size of a scene, m: largest distance of hinges on a body, or of mass centre and hinge."""
-    hinge_distances = [hypot(*part.hung.point) for part in parts]
+    hinge_distances = [hypot(*part.attachment.point) for part in parts]
     centre_distances = [hypot(*part.first) / part.mass for part in parts if part.mass > 0]
     size = max([*hinge_distances, *centre_distances]) or 1.0
     if not np.isfinite(size):

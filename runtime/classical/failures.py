@@ -9,7 +9,7 @@ def failure_message(lib: Any, failure: int, hinge: str, body: str) -> tuple[str,
     """Message and remedy of a failure; `hinge` and `body` name the failing element."""
     return {
         lib.MSTMM_CLASSICAL_SINGULAR: (
-            f"{hinge}: its motion is undetermined", "give mass and inertia to what it carries",
+            f"{hinge}: its motion is undetermined", "give the outboard bodies mass and inertia",
         ),
         lib.MSTMM_CLASSICAL_LOST: (
             f"the product of transfer matrices is lost to rounding: loads remain at the free end "

@@ -30,19 +30,19 @@ _PLANE_TOLERANCE = 1e-10
 class PartMovement:
     """Movement of a part at n times, or at one time without the axis n.
 
-    Position and velocity (n, 3) of its reference point in inertial axes, `spin` (n, 3) in its own
-    axes, `axes` (n, 3, 3), modal coordinates and their rates (n, k).  Accelerations and loads are
-    optional.
+    Position and velocity (n, 3) of its reference point in inertial axes, `angular_velocity` (n, 3)
+    in its own axes, `axes` (n, 3, 3), modal coordinates and their rates (n, k).  Accelerations and
+    loads are optional.
     """
 
     position: Array
     velocity: Array
-    spin: Array
+    angular_velocity: Array
     axes: Array
     eta: Array
     etad: Array
     acceleration: Array | None = None
-    spun: Array | None = None
+    angular_acceleration: Array | None = None
     etadd: Array | None = None
     load: Array | None = None
 
@@ -64,15 +64,15 @@ class Form(ABC):
         """Fields of a part's record, each flat; omitted fields are zero."""
 
     @abstractmethod
-    def places(self, bending: Bending) -> list[int]:
+    def shape_indices(self, bending: Bending) -> list[int]:
         """Indices of a beam's shapes among those of its matrix."""
 
     @abstractmethod
-    def start(self, k: int, at: PartMovement) -> Array:
+    def initial_motion(self, k: int, at: PartMovement) -> Array:
         """Initial motion (MOTION,) of a part."""
 
     @abstractmethod
-    def moving(self, part: Part, k: int, motion: Array) -> PartMovement:
+    def part_movement(self, part: Part, k: int, motion: Array) -> PartMovement:
         """Movement of a part in space, from its motions (n, MOTION)."""
 
     def modal(self, part: Part, sign: float = 1.0) -> dict[str, Array]:
@@ -80,7 +80,7 @@ class Form(ABC):
         bending = part.bending
         if bending is None:
             return {}
-        indices, upper_triangle = self.places(bending), np.triu_indices(self.shapes)
+        indices, upper_triangle = self.shape_indices(bending), np.triu_indices(self.shapes)
         block, shift, moment = np.ix_(indices, indices), *np.zeros((2, self.shapes))
         shift[indices], moment[indices] = sign * bending.shift, sign * bending.moment
         mass = part.mass * np.eye(self.shapes)
@@ -92,19 +92,19 @@ class Form(ABC):
             "stiffness": stiffness[upper_triangle], "damping": damping[upper_triangle],
         }  # fmt: skip
 
-    def spread(self, part: Part | None, shapes: Array) -> Array:
+    def flatten_shapes(self, part: Part | None, shapes: Array) -> Array:
         """Columns of a beam's shapes in the layout of its matrix, flat."""
         if part is None or part.bending is None:
             return np.zeros(0)
         spread = np.zeros((len(shapes), self.shapes))
-        spread[:, self.places(part.bending)] = shapes
+        spread[:, self.shape_indices(part.bending)] = shapes
         return spread.ravel()
 
-    def modal_places(self, part: Part) -> list[int]:
+    def modal_indices(self, part: Part) -> list[int]:
         """Indices of a part's modal coordinates in the position of a motion."""
         if part.bending is None:
             return []
-        return [self.first + place for place in self.places(part.bending)]
+        return [self.first + place for place in self.shape_indices(part.bending)]
 
 
 class Spatial(Form):
@@ -126,34 +126,41 @@ class Spatial(Form):
     def gravity(self, gravity: Array) -> Array:
         return gravity
 
-    def places(self, bending: Bending) -> list[int]:
+    def shape_indices(self, bending: Bending) -> list[int]:
         return [direction - 1 for direction in bending.directions]
 
     def record(self, parts: Sequence[Part], k: int) -> dict[str, Array]:
-        part, attachment = parts[k], parts[k].hung
+        part, attachment = parts[k], parts[k].attachment
         parent = parts[attachment.parent] if attachment.parent >= 0 else None
         fields = {
             "first": part.first,
             "inertia": part.inertia,
             "place": attachment.point,
-            "turn": attachment.turn.ravel(),
+            "turn": attachment.rotation.ravel(),
             "end": part.end.ravel(),
-            "shapes": self.spread(parent, attachment.shapes),
-            "slopes": self.spread(parent, attachment.slopes),
-            "held": self.spread(part, part.held),
+            "shapes": self.flatten_shapes(parent, attachment.shapes),
+            "slopes": self.flatten_shapes(parent, attachment.slopes),
+            "held": self.flatten_shapes(part, part.section_rotation),
         }
         if part.springs is not None:
             law = part.springs.law
             fields |= {"law": np.array(law.p), "law_axes": np.array(law.axes)}
         return fields | self.modal(part)
 
-    def start(self, k: int, at: PartMovement) -> Array:
-        motion, modes = np.zeros(MOTION), np.array(self.modal_places(self.parts[k]), dtype=np.int64)
-        assert at.acceleration is not None and at.spun is not None and at.etadd is not None
+    def initial_motion(self, k: int, at: PartMovement) -> Array:
+        motion, modes = (
+            np.zeros(MOTION),
+            np.array(self.modal_indices(self.parts[k]), dtype=np.int64),
+        )
+        assert (
+            at.acceleration is not None
+            and at.angular_acceleration is not None
+            and at.etadd is not None
+        )
         for offset, translation, rotation, modal in (
-            (POSITION, at.position, np.zeros(3), at.eta), (SPEED, at.velocity, at.spin, at.etad),
-            (RATE, at.acceleration, at.spun, at.etadd),
-            (AUXILIARY, at.acceleration, at.spun, at.etadd),
+            (POSITION, at.position, np.zeros(3), at.eta), (SPEED, at.velocity, at.angular_velocity,
+            at.etad), (RATE, at.acceleration, at.angular_acceleration, at.etadd), (AUXILIARY,
+            at.acceleration, at.angular_acceleration, at.etadd),
         ):  # fmt: skip
             motion[offset : offset + 3], motion[offset + 3 : offset + 6] = translation, rotation
             motion[offset + modes] = modal
@@ -161,8 +168,8 @@ class Spatial(Form):
         motion[INBOARD : INBOARD + 6] = motion[OUTBOARD : OUTBOARD + 6] = at.load
         return motion
 
-    def moving(self, part: Part, k: int, motion: Array) -> PartMovement:
-        modes = np.array(self.modal_places(part), dtype=np.int64)
+    def part_movement(self, part: Part, k: int, motion: Array) -> PartMovement:
+        modes = np.array(self.modal_indices(part), dtype=np.int64)
         return PartMovement(
             motion[:, POSITION : POSITION + 3], motion[:, SPEED : SPEED + 3],
             motion[:, SPEED + 3 : SPEED + 6], motion[:, AXES : AXES + 9].reshape(-1, 3, 3),
@@ -188,14 +195,14 @@ class Planar(Form):
     def gravity(self, gravity: Array) -> Array:
         return np.append((self.ground.T @ gravity)[:2], 0.0)
 
-    def places(self, bending: Bending) -> list[int]:
+    def shape_indices(self, bending: Bending) -> list[int]:
         return list(range(bending.n))
 
     def record(self, parts: Sequence[Part], k: int) -> dict[str, Array]:
-        part, attachment, own_frame = parts[k], parts[k].hung, self.frames[k]
+        part, attachment, own_frame = parts[k], parts[k].attachment, self.frames[k]
         parent = parts[attachment.parent] if attachment.parent >= 0 else None
         parent_frame = self.frames[attachment.parent] if attachment.parent >= 0 else self.ground
-        axes = parent_frame.T @ attachment.turn
+        axes = parent_frame.T @ attachment.rotation
         body = axes @ part.end.T @ own_frame
         turn = [np.arctan2(body[1, 0], body[0, 0]), np.arctan2(axes[1, 0], axes[0, 0])]
         normal = own_frame[:, 2]
@@ -203,9 +210,9 @@ class Planar(Form):
             "first": (own_frame.T @ part.first)[:2],
             "inertia": np.array([normal @ full_inertia(part.inertia) @ normal]),
             "place": (parent_frame.T @ attachment.point)[:2], "turn": np.array(turn),
-            "shapes": self.spread(parent, (parent_frame.T @ attachment.shapes)[:2]),
-            "slopes": self.spread(parent, (parent_frame.T @ attachment.slopes)[2:]),
-            "held": self.spread(part, (own_frame.T @ part.held)[2:]),
+            "shapes": self.flatten_shapes(parent, (parent_frame.T @ attachment.shapes)[:2]),
+            "slopes": self.flatten_shapes(parent, (parent_frame.T @ attachment.slopes)[2:]),
+            "held": self.flatten_shapes(part, (own_frame.T @ part.section_rotation)[2:]),
         }  # fmt: skip
         if part.springs is not None:
             law = np.array(part.springs.law.p)
@@ -214,18 +221,25 @@ class Planar(Form):
         direction = part.bending.directions[0] if part.bending is not None else 1
         return fields | self.modal(part, float(np.sign(own_frame[direction, 1])))
 
-    def start(self, k: int, at: PartMovement) -> Array:
-        motion, modes = np.zeros(MOTION), np.array(self.modal_places(self.parts[k]), dtype=np.int64)
-        assert at.acceleration is not None and at.spun is not None and at.etadd is not None
+    def initial_motion(self, k: int, at: PartMovement) -> Array:
+        motion, modes = (
+            np.zeros(MOTION),
+            np.array(self.modal_indices(self.parts[k]), dtype=np.int64),
+        )
+        assert (
+            at.acceleration is not None
+            and at.angular_acceleration is not None
+            and at.etadd is not None
+        )
         assert at.load is not None
         own_frame, ground = self.frames[k], self.ground
         relative_axes = ground.T @ at.axes @ own_frame
         angle = np.arctan2(relative_axes[1, 0], relative_axes[0, 0])
         normal = own_frame[:, 2]
         for offset, translation, rotation, modal in (
-            (POSITION, at.position, angle, at.eta), (SPEED, at.velocity, normal @ at.spin, at.etad),
-            (RATE, at.acceleration, normal @ at.spun, at.etadd),
-            (AUXILIARY, at.acceleration, normal @ at.spun, at.etadd),
+            (POSITION, at.position, angle, at.eta), (SPEED, at.velocity, normal @
+            at.angular_velocity, at.etad), (RATE, at.acceleration, normal @ at.angular_acceleration,
+            at.etadd), (AUXILIARY, at.acceleration, normal @ at.angular_acceleration, at.etadd),
         ):  # fmt: skip
             motion[offset : offset + 2], motion[offset + 2] = (ground.T @ translation)[:2], rotation
             motion[offset + modes] = modal
@@ -234,8 +248,8 @@ class Planar(Form):
             motion[offset + 1 : offset + 3] = (ground.T @ at.load[3:])[:2]
         return motion
 
-    def moving(self, part: Part, k: int, motion: Array) -> PartMovement:
-        modes = np.array(self.modal_places(part), dtype=np.int64)
+    def part_movement(self, part: Part, k: int, motion: Array) -> PartMovement:
+        modes = np.array(self.modal_indices(part), dtype=np.int64)
         ground, own_frame, n = self.ground, self.frames[k], len(motion)
         cosine, sine = np.cos(motion[:, POSITION + 2]), np.sin(motion[:, POSITION + 2])
         rotation = np.zeros((n, 3, 3))
@@ -313,7 +327,9 @@ def _moves_in_plane(
     part: Part, at: PartMovement, normal: Array, own: Array, height: float, size: float
 ) -> bool:
     """True if a part is symmetric about the plane and moves in it."""
-    speed = max(float(np.linalg.norm(at.velocity)), size * float(np.linalg.norm(at.spin)))
+    speed = max(
+        float(np.linalg.norm(at.velocity)), size * float(np.linalg.norm(at.angular_velocity))
+    )
     inertia_of_normal = full_inertia(part.inertia) @ own
     conditions = [
         abs(at.position @ normal - height) <= _PLANE_TOLERANCE * size,
@@ -321,7 +337,8 @@ def _moves_in_plane(
         np.linalg.norm(inertia_of_normal - own * (own @ inertia_of_normal))
         <= _PLANE_TOLERANCE * np.abs(part.inertia).max(),
         abs(at.velocity @ normal) <= _PLANE_TOLERANCE * speed,
-        size * np.linalg.norm(at.spin - own * (own @ at.spin)) <= _PLANE_TOLERANCE * speed,
+        size * np.linalg.norm(at.angular_velocity - own * (own @ at.angular_velocity))
+        <= _PLANE_TOLERANCE * speed,
         part.kind in (FREE, FIXED, BALL) or _rotates_about_normal(part, own),
     ]
     if part.bending is not None and part.bending.n:

@@ -68,32 +68,34 @@ class StateConversion:
 
     def __init__(self, packed: PackedScene, parts: Sequence[Part], form: Form, q: Array) -> None:
         system = packed.system
-        self.parts, self.form, self.places = parts, form, system.places
+        self.parts, self.form, self.first_indices = parts, form, system.first_indices
         self.numbers = [system.body(part.hinge) for part in parts]
-        self.nq, self.nu, self.last = system.nq, system.nu, q.copy()
+        self.nq, self.nu, self.last_q = system.nq, system.nu, q.copy()
         self.memory = np.zeros(max(1, system.n_memory))
         self.memory = self._memory(q[None])[0]
 
-    def of(self, motions: Array) -> tuple[Array, Array, Array]:
+    def convert(self, motions: Array) -> tuple[Array, Array, Array]:
         """Convert motions (n, parts, MOTION) to q (n, nq), u (n, nu) and memory (n, m)."""
         n = len(motions)
         q, u = np.zeros((n, self.nq)), np.zeros((n, self.nu))
-        movements = [self.form.moving(part, k, motions[:, k]) for k, part in enumerate(self.parts)]
+        movements = [
+            self.form.part_movement(part, k, motions[:, k]) for k, part in enumerate(self.parts)
+        ]
         for k, (part, record) in enumerate(zip(self.parts, self.numbers, strict=True)):
             if part.bending is not None:
                 modes = slice(part.bending.q, part.bending.q + part.bending.n)
                 rates = slice(part.bending.u, part.bending.u + part.bending.n)
                 q[:, modes], u[:, rates] = movements[k].eta, movements[k].etad
             if record.nu:
-                first_q = int(self.places["q"][part.hinge])
-                first_u = int(self.places["u"][part.hinge])
+                first_q = int(self.first_indices["q"][part.hinge])
+                first_u = int(self.first_indices["u"][part.hinge])
                 self._hinge(
                     k, movements, q[:, first_q : first_q + record.nq],
-                    u[:, first_u : first_u + record.nu], self.last[first_q:],
+                    u[:, first_u : first_u + record.nu], self.last_q[first_q:],
                 )  # fmt: skip
         memory = self._memory(q)
         if n:
-            self.last, self.memory = q[-1].copy(), memory[-1].copy()
+            self.last_q, self.memory = q[-1].copy(), memory[-1].copy()
         return q, u, memory
 
     def _memory(self, q: Array) -> Array:
@@ -101,7 +103,7 @@ class StateConversion:
         memory = np.repeat(self.memory[None], len(q), axis=0)
         for part, record in zip(self.parts, self.numbers, strict=True):
             if part.springs is not None:
-                index, first = part.springs.twist, int(self.places["q"][part.hinge])
+                index, first = part.springs.twist, int(self.first_indices["q"][part.hinge])
                 w, *vector = q[:, first + record.nq - 4 : first + record.nq].T
                 axial = np.array(part.springs.law.axes).reshape(3, 3)[:, 2] @ np.array(vector)
                 angles = np.append(self.memory[index], 2 * np.arctan2(axial, w))
@@ -111,8 +113,14 @@ class StateConversion:
     def _hinge(self, k: int, moving: list[PartMovement], q: Array, u: Array, last: Array) -> None:
         """Write coordinates and speeds of the inboard hinge of a part into `q` and `u`."""
         part = self.parts[k]
-        outboard = _section(moving[k], np.zeros(3), part.end, np.zeros_like(part.held), part.held)
-        inboard = _inboard_section(part.hung, moving, len(q))
+        outboard = _section(
+            moving[k],
+            np.zeros(3),
+            part.end,
+            np.zeros_like(part.section_rotation),
+            part.section_rotation,
+        )
+        inboard = _inboard_section(part.attachment, moving, len(q))
         rotation = np.einsum("nji,njk->nik", inboard.axes, outboard.axes)
         spin = np.einsum("nji,nj->ni", outboard.axes, outboard.spin - inboard.spin)
         if u.shape[1] == 1:
@@ -132,15 +140,15 @@ class StateConversion:
 def _inboard_section(hung: Attachment, moving: list[PartMovement], n: int) -> _Section:
     if hung.parent < 0:
         zeros = np.zeros((n, 3))
-        return _Section(zeros + hung.point, zeros, zeros, np.broadcast_to(hung.turn, (n, 3, 3)))
-    return _section(moving[hung.parent], hung.point, hung.turn, hung.shapes, hung.slopes)
+        return _Section(zeros + hung.point, zeros, zeros, np.broadcast_to(hung.rotation, (n, 3, 3)))
+    return _section(moving[hung.parent], hung.point, hung.rotation, hung.shapes, hung.slopes)
 
 
 def _section(at: PartMovement, point: Array, turn: Array, shapes: Array, slopes: Array) -> _Section:
     """Section of a part whose position is `point` and whose rotation is `turn` at rest."""
     lever = np.einsum("nij,nj->ni", at.axes, point + at.eta @ shapes.T)
     bending_rotation, tangent = _rotations_and_tangents(at.eta @ slopes.T)
-    spin = np.einsum("nij,nj->ni", at.axes, at.spin)
+    spin = np.einsum("nij,nj->ni", at.axes, at.angular_velocity)
     modal_velocity = np.einsum("nij,nj->ni", at.axes, at.etad @ shapes.T)
     modal_spin = np.einsum("nij,njk,nk->ni", at.axes, tangent, at.etad @ slopes.T)
     return _Section(

@@ -53,7 +53,7 @@ _SUPPORTED_LOADS = "the only supported loads are gravity and elastic hinges"
 
 
 def _check_loads(packed: PackedScene) -> None:
-    scene = packed.described
+    scene = packed.user_scene
     for table, elements, reason in (
         ("load", scene.load, _SUPPORTED_LOADS), ("spring", scene.spring, _SUPPORTED_LOADS),
         ("bushing", scene.bushing, _SUPPORTED_LOADS),
@@ -75,7 +75,7 @@ def _laws_by_body(packed: PackedScene) -> dict[int, list[Springs]]:
     """Laws by places of their bodies; SceneError for a law with an effort."""
     laws_found: dict[int, list[Springs]] = {}
     for law_batch in packed.system.laws:
-        for law, body, twist, efforts in law_batch.each():
+        for law, body, twist, efforts in law_batch.iterate_laws():
             if any(place >= 0 for place in efforts):
                 raise unsupported_error(
                     _hinge_label(packed, body), "its matrices contain no efforts"
@@ -105,9 +105,7 @@ def _hinge_kind(
         return kind, None
     if not laws:
         if not on_ground:
-            raise unsupported_error(
-                label, f"the hinge constrains nothing there; {_SUPPORTED_HINGES}"
-            )
+            raise unsupported_error(label, f"this hinge has no constraints; {_SUPPORTED_HINGES}")
         return FREE, None
     if len(laws) != 1 or laws[0].law.kernel != "six":
         raise unsupported_error(label, "its friction has no matrix")
@@ -116,7 +114,7 @@ def _hinge_kind(
 
 def _rigid_kind(facts: HingeProperties | None) -> str | None:
     """Kind of a hinge by its free motions; None if there is no matrix."""
-    if facts is None or not facts.steady:
+    if facts is None or not facts.constant_subspace:
         return None
     if facts.welds:
         return FIXED

@@ -17,22 +17,22 @@ from mstmm.scene.tables.loads import Spring
 class ActiveExpression:
     """Expression that acts on the motion of a scene.
 
-    `what` names its owner in messages.  `hinges` are the indices of the hinges whose q, u and
-    parameters it names; `spring` is the spring whose length it reads.  The second derivative of a
-    `drive` acts on the motion; a `condition` (an event or a release) acts by becoming true.
-    `inputs` are the inputs and signals that it names, except those in `held`, whose values are
-    unknown before the run.
+    `description` names its owner in messages.  `hinges` are the indices of the hinges whose q, u
+    and parameters it names; `spring` is the spring whose length it reads.  The second derivative of
+    a `drive` acts on the motion; a `condition` (an event or a release) acts by becoming true.
+    `inputs` are the inputs and signals that it names, except those in `held_inputs`, whose values
+    are unknown before the run.
     """
 
     expression: Expression
-    what: str
+    description: str
     hinges: Sequence[int] = ()
     spring: Spring | None = None
     drive: bool = False
     condition: bool = False
     constants: tuple[tuple[str, float], ...] = field(default=())
     inputs: tuple[str, ...] = ()
-    held: tuple[str, ...] = ()
+    held_inputs: tuple[str, ...] = ()
 
 
 def active_expressions(
@@ -44,7 +44,7 @@ def active_expressions(
     all inputs over time (by default those of the scene).
     """
     inputs = scene.channels if inputs is None else inputs
-    held = {*held, *scene.controlled}
+    held = {*held, *scene.controllers_by_input}
     return [
         _with_inputs(entry, inputs, held)
         for entry in _all_expressions(scene)
@@ -59,11 +59,11 @@ def _with_inputs(one: ActiveExpression, inputs: Inputs, held: Collection[str]) -
         return one
     known_inputs = {name: channel for name, channel in used_inputs.items() if name not in held}
     constant_inputs = (
-        (name, channel.value(0.0)) for name, channel in known_inputs.items() if channel.stands
+        (name, channel.value(0.0)) for name, channel in known_inputs.items() if channel.is_constant
     )
     return replace(
         one, constants=(*one.constants, *constant_inputs), inputs=tuple(known_inputs),
-        held=tuple(name for name in used_inputs if name in held),
+        held_inputs=tuple(name for name in used_inputs if name in held),
     )  # fmt: skip
 
 
@@ -112,7 +112,7 @@ def examined_hinges(one: ActiveExpression, hinges: Hinges) -> Iterator[Hinge | N
 
     These are all its hinges if it reads their q and u, else only the first; None without hinges.
     """
-    shared_names = ("t", *one.inputs, *one.held)
+    shared_names = ("t", *one.inputs, *one.held_inputs)
     reads_hinge_state = any(
         len(n.parts) == 1 and n.text not in shared_names for n in one.expression.names
     )

@@ -48,8 +48,8 @@ class ExpressionFunctions:
         self.drive, self.variable = drive, names[0]
         self._leaves = leaves or (lambda t: {names[0]: identity_enclosure(t)})
         self.order, varying_terms = terms_of_names(expression, constants, names)
-        self.moving = frozenset(varying_terms)
-        self.most = min(_MAX_CELLS, _MAX_TERM_EVALUATIONS // max(1, len(self.order)))
+        self.varying = frozenset(varying_terms)
+        self.max_cells = min(_MAX_CELLS, _MAX_TERM_EVALUATIONS // max(1, len(self.order)))
 
     def terms(self, t: Interval) -> dict[int, Enclosure]:
         """Enclosures of all terms that depend on the variable only."""
@@ -64,18 +64,18 @@ class ExpressionFunctions:
     def widest(self) -> list[int]:
         """Largest terms that depend on the variable only."""
         terms = self.expression.terms
-        inner_terms = {i for n in self.moving for i in terms[n].args}
-        return sorted(self.moving - inner_terms)
+        inner_terms = {i for n in self.varying for i in terms[n].args}
+        return sorted(self.varying - inner_terms)
 
-    def watched(self) -> list[WatchedFunction]:
+    def narrow_candidates(self) -> list[WatchedFunction]:
         """Functions that may have narrow features: all but sums, products and switches.
 
         For a drive, whose second derivative acts, their slopes are included.
         """
         functions = []
-        for term_index in sorted(self.moving):
+        for term_index in sorted(self.varying):
             term = self.expression.terms[term_index]
-            if term.op == "div" and term.args[1] not in self.moving:
+            if term.op == "div" and term.args[1] not in self.varying:
                 continue
             if term.op in _FUNCTIONS:
                 is_periodic = term.op in ("sin", "cos")
@@ -92,7 +92,7 @@ class ExpressionFunctions:
         """
         linear_terms, terms = self.expression.linear_switches(), self.expression.terms
         unique_margins: dict[tuple[bool, str], Margin] = {}
-        for term_index in sorted(self.moving - set(linear_terms)):
+        for term_index in sorted(self.varying - set(linear_terms)):
             term = terms[term_index]
             margin = self._margin(term)
             if margin is not None:
@@ -106,22 +106,22 @@ class ExpressionFunctions:
     def _margin(self, term: Term) -> Margin | None:
         op, args = term.op, term.args
         if op in _DIFFERENCES:
-            return self._of(args, lambda a, b: a - b)
+            return self._margin_of(args, lambda a, b: a - b)
         if op in ("sign", "abs", "log", "sqrt", "atan2"):
-            return self._of(args[:1], lambda a: a)
-        if op == "div" and args[1] in self.moving:
-            return self._of(args[1:], lambda a: a)
+            return self._margin_of(args[:1], lambda a: a)
+        if op == "div" and args[1] in self.varying:
+            return self._margin_of(args[1:], lambda a: a)
         if op == "tan":
-            return self._of(args, lambda a: Enclosure(cos(a.value), EVERYTHING))
-        if op == "pow" and args[0] in self.moving and not self._is_whole(args[1]):
-            return self._of(args[:1], lambda a: a)
+            return self._margin_of(args, lambda a: Enclosure(cos(a.value), EVERYTHING))
+        if op == "pow" and args[0] in self.varying and not self._is_natural_number(args[1]):
+            return self._margin_of(args[:1], lambda a: a)
         return None
 
-    def _is_whole(self, exponent: int) -> bool:
+    def _is_natural_number(self, exponent: int) -> bool:
         value = self.expression.terms[exponent].constant
         return value is not None and value >= 0 and value == int(value)
 
-    def _of(self, args: tuple[int, ...], difference: Callable[..., Enclosure]) -> Margin:
+    def _margin_of(self, args: tuple[int, ...], difference: Callable[..., Enclosure]) -> Margin:
         term_indices = self._below(args)
         terms, constants = self.expression.terms, self.constants
 

@@ -59,7 +59,7 @@ class Interval:
         return np.asarray(self.hi - self.lo)
 
     @property
-    def meets_zero(self) -> NDArray[np.bool_]:
+    def contains_zero(self) -> NDArray[np.bool_]:
         """Mask of the intervals that contain zero."""
         return np.asarray((self.lo <= 0) & (self.hi >= 0))
 
@@ -77,11 +77,11 @@ class Interval:
         """Smallest interval that contains both intervals."""
         return Interval(np.fmin(self.lo, other.lo), np.fmax(self.hi, other.hi))
 
-    def meet(self, other: Interval) -> Interval:
+    def intersect(self, other: Interval) -> Interval:
         """Intersection of two intervals; where one is empty, the other one."""
         return Interval(np.fmax(self.lo, other.lo), np.fmin(self.hi, other.hi))
 
-    def where(self, a: Interval, b: Interval) -> Interval:
+    def select(self, a: Interval, b: Interval) -> Interval:
         """`a` where this interval excludes zero, `b` where it is zero, else the hull of both."""
         union, is_nonzero, is_zero = a.hull(b), self.is_one_sided, (self.lo == 0) & (self.hi == 0)
         lo = np.where(is_nonzero, a.lo, np.where(is_zero, b.lo, union.lo))
@@ -147,14 +147,14 @@ def absolute(x: Interval) -> Interval:
     """Bounds of the absolute value."""
     abs_lo, abs_hi = np.abs(x.lo), np.abs(x.hi)
     return Interval(
-        np.where(x.meets_zero, 0.0, np.minimum(abs_lo, abs_hi)), np.maximum(abs_lo, abs_hi)
+        np.where(x.contains_zero, 0.0, np.minimum(abs_lo, abs_hi)), np.maximum(abs_lo, abs_hi)
     )
 
 
-def whole_power(x: Interval, n: int) -> Interval:
+def integer_power(x: Interval, n: int) -> Interval:
     """Bounds of x^n for an integer n."""
     if n < 0:
-        return as_interval(1.0) / whole_power(x, -n)
+        return as_interval(1.0) / integer_power(x, -n)
     if n % 2 == 0:
         size = absolute(x)
         return _widen_library_result(size.lo**n, size.hi**n).within(0.0, np.inf)

@@ -42,7 +42,7 @@ def terms_of_names(
 ) -> tuple[list[int], list[int]]:
     """Split terms as `terms_of_time` does, with the names `variables` instead of t."""
     closed_terms, varying_terms = set[int](), set[int]()
-    for index in sorted(expression.needed):
+    for index in sorted(expression.required_terms):
         term = expression.terms[index]
         if term.constant is not None or _is_known(term, constants):
             closed_terms.add(index)
@@ -121,8 +121,8 @@ def _power(args: list[Enclosure], exponent: float | None) -> Enclosure:
     base, exponent_bounds = args
     if exponent is not None and exponent == int(exponent) and abs(exponent) < 2**31:
         n = int(exponent)
-        slope = as_interval(float(n)) * iv.whole_power(base.value, n - 1) if n else _ZERO
-        return Enclosure(iv.whole_power(base.value, n), slope * base.slope)
+        slope = as_interval(float(n)) * iv.integer_power(base.value, n - 1) if n else _ZERO
+        return Enclosure(iv.integer_power(base.value, n), slope * base.slope)
     logarithm = iv.log(base.value)
     value = iv.bound_increasing(np.exp, exponent_bounds.value * logarithm)
     rate = exponent_bounds.slope * logarithm + exponent_bounds.value * base.slope / base.value
@@ -155,17 +155,17 @@ def _extreme(v: list[Interval], d: list[Interval], largest: bool) -> Enclosure:
     is_first = (
         iv.certainly_less(v[1], v[0], False) if largest else iv.certainly_less(v[0], v[1], False)
     )
-    return Enclosure(value, is_first.where(d[0], d[1]))
+    return Enclosure(value, is_first.select(d[0], d[1]))
 
 
 def _atan2(v: list[Interval], d: list[Interval]) -> Enclosure:
     """Enclosure between the angles of the corners if the cell misses branch cut and origin."""
     y, x = v
     corners = [np.arctan2(b, a) for a in (x.lo, x.hi) for b in (y.lo, y.hi)]
-    cut = y.meets_zero & (x.lo <= 0)
+    cut = y.contains_zero & (x.lo <= 0)
     lo, hi = np.minimum.reduce(corners), np.maximum.reduce(corners)
     value = Interval(np.where(cut, -np.pi, lo - 1e-15), np.where(cut, np.pi, hi + 1e-15))
-    size = iv.whole_power(x, 2) + iv.whole_power(y, 2)
+    size = iv.integer_power(x, 2) + iv.integer_power(y, 2)
     slope = (x * d[0] - y * d[1]) / size
     return Enclosure(value, Interval(np.where(cut, -np.inf, slope.lo),
                                      np.where(cut, np.inf, slope.hi)))  # fmt: skip
@@ -173,12 +173,12 @@ def _atan2(v: list[Interval], d: list[Interval]) -> Enclosure:
 
 def _where(v: list[Interval], d: list[Interval]) -> Enclosure:
     """Enclosure of `where`; the slope is unbounded where the condition may switch."""
-    is_uncertain = v[0].meets_zero & (v[0].hi > 0)
-    slope = v[0].where(d[1], d[2])
+    is_uncertain = v[0].contains_zero & (v[0].hi > 0)
+    slope = v[0].select(d[1], d[2])
     slope_bounds = Interval(
         np.where(is_uncertain, -np.inf, slope.lo), np.where(is_uncertain, np.inf, slope.hi)
     )
-    return Enclosure(v[0].where(v[1], v[2]), slope_bounds)
+    return Enclosure(v[0].select(v[1], v[2]), slope_bounds)
 
 
 _Slope = Callable[[Interval, Interval], Interval]
@@ -187,18 +187,18 @@ _Slope = Callable[[Interval, Interval], Interval]
 _FUNCTIONS: dict[str, tuple[Callable[[Interval], Interval], _Slope]] = {
     "sin": (iv.sin, lambda x, _: iv.cos(x)),
     "cos": (iv.cos, lambda x, _: -iv.sin(x)),
-    "tan": (lambda x: iv.sin(x) / iv.cos(x), lambda x, _: _ONE / iv.whole_power(iv.cos(x), 2)),
+    "tan": (lambda x: iv.sin(x) / iv.cos(x), lambda x, _: _ONE / iv.integer_power(iv.cos(x), 2)),
     "asin": (
         lambda x: iv.bound_increasing(np.arcsin, x.within(-1, 1)),
-        lambda x, _: _ONE / iv.sqrt(_ONE - iv.whole_power(x, 2)),
+        lambda x, _: _ONE / iv.sqrt(_ONE - iv.integer_power(x, 2)),
     ),
     "acos": (
         lambda x: iv.bound_decreasing(np.arccos, x.within(-1, 1)),
-        lambda x, _: -_ONE / iv.sqrt(_ONE - iv.whole_power(x, 2)),
+        lambda x, _: -_ONE / iv.sqrt(_ONE - iv.integer_power(x, 2)),
     ),
     "atan": (
         lambda x: iv.bound_increasing(np.arctan, x),
-        lambda x, _: _ONE / (_ONE + iv.whole_power(x, 2)),
+        lambda x, _: _ONE / (_ONE + iv.integer_power(x, 2)),
     ),
     "sinh": (
         lambda x: iv.bound_increasing(np.sinh, x),
@@ -210,7 +210,7 @@ _FUNCTIONS: dict[str, tuple[Callable[[Interval], Interval], _Slope]] = {
     ),
     "tanh": (
         lambda x: iv.bound_increasing(np.tanh, x),
-        lambda _, v: (_ONE - iv.whole_power(v, 2)).within(0, 1),
+        lambda _, v: (_ONE - iv.integer_power(v, 2)).within(0, 1),
     ),
     "exp": (lambda x: iv.bound_increasing(np.exp, x), lambda _, v: v),
     "log": (iv.log, lambda x, _: _ONE / x.within(0, np.inf)),

@@ -32,7 +32,7 @@ def find_poles(view: ExpressionFunctions, gaps: Array) -> tuple[NDArray[np.bool_
     time alone are examined.
     """
     is_pole = np.zeros(len(gaps), bool)
-    has_pole_operation = any(view.expression.terms[i].op in _POLE_OPERATIONS for i in view.moving)
+    has_pole_operation = any(view.expression.terms[i].op in _POLE_OPERATIONS for i in view.varying)
     if not has_pole_operation or not len(gaps):
         return is_pole, False
     largest_terms = view.widest()

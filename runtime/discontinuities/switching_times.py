@@ -54,7 +54,7 @@ def find_roots(margin: Margin, start: float, end: float, most: int = 2**16) -> R
             a - middle, b - middle
         )
         may_contain_root = np.broadcast_to(
-            enclosure.value.meet(mean_value_bounds).meets_zero, a.shape
+            enclosure.value.intersect(mean_value_bounds).contains_zero, a.shape
         )
         has_single_root = may_contain_root & enclosure.slope.is_one_sided
         brackets.append(

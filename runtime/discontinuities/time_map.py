@@ -52,7 +52,7 @@ class TimeMap:
     pole: tuple[float, str] | None = None
     notes: tuple[Risk, ...] = field(default=())
 
-    def too_long(self, step: float) -> Risk | None:
+    def missed_feature_risk(self, step: float) -> Risk | None:
         """Finding if a fixed step (s) could miss a feature of a load, else None."""
         shortest = float(self.longest.min(initial=np.inf))
         if step <= shortest:
@@ -63,7 +63,7 @@ class TimeMap:
             f"the fixed step of {step:g} s is too long for {self.narrowest}, which near "
             f"t = {time:.6g} s requires steps of {shortest:.2g} s: features may be missed",
             f"use a step below {shortest:.2g} s, or omit step", step, shortest, "s",
-            before=True,
+            seen_before_run=True,
         )  # fmt: skip
 
 
@@ -125,10 +125,10 @@ def _map_expressions(
                 entry.expression, _neighbours_of_knots(knots, start, end), inputs
             )
             if jump_text:
-                raise SceneError(f"{entry.what}: {_quote_expression(entry)} {jump_text}")
+                raise SceneError(f"{entry.description}: {_quote_expression(entry)} {jump_text}")
         is_force = not (entry.drive or entry.condition)
         for margin in functions.margins():
-            roots_found = find_roots(margin, start, end, functions.most)
+            roots_found = find_roots(margin, start, end, functions.max_cells)
             breaks.update(roots_found.gaps.ravel().tolist())
             jump_text = (
                 jump_message(entry.expression, roots_found.gaps.tolist(), inputs)
@@ -136,7 +136,7 @@ def _map_expressions(
                 else ""
             )
             if jump_text:
-                raise SceneError(f"{entry.what}: {_quote_expression(entry)} {jump_text}")
+                raise SceneError(f"{entry.description}: {_quote_expression(entry)} {jump_text}")
             is_pole, is_whole = (
                 find_poles(functions, roots_found.gaps)
                 if is_force
@@ -150,12 +150,14 @@ def _map_expressions(
                     findings.append(_pole_risk(entry, pole_time))
             if not roots_found.complete:
                 findings.append(_switches_risk(entry, roots_found.open_from))
-        watched_functions = functions.watched()
+        watched_functions = functions.narrow_candidates()
         if watched_functions:
             limits.append(
                 (
-                    step_limits(functions.terms, watched_functions, start, end, functions.most),
-                    entry.what,
+                    step_limits(
+                        functions.terms, watched_functions, start, end, functions.max_cells
+                    ),
+                    entry.description,
                 )
             )
             if not limits[-1][0].complete:
@@ -173,21 +175,19 @@ def _map_expressions(
 
 def _pole_message(one: ActiveExpression) -> str:
     return (
-        f"{one.what} ({_quote_expression(one)}) grows beyond all bounds there, too fast for any "
-        f"motion to "
-        "pass; end the run before that time, or limit it, such as by min or max"
+        f"{one.description} ({_quote_expression(one)}) is unbounded there; end the run before that "
+        "time, or limit it, for example by min or max"
     )
 
 
 def _pole_risk(one: ActiveExpression, t: float) -> Risk:
     return Risk(
         "pole",
-        one.what,
-        f"a part of {one.what} ({_quote_expression(one)}) grows beyond all bounds at t = {t:.6g} "
-        f"s: unless "
-        "its factor vanishes there, no motion passes",
-        "end the run before that time, or limit the part, such as by min or max",
-        before=True,
+        one.description,
+        f"a part of {one.description} ({_quote_expression(one)}) is unbounded at t = {t:.6g} s: "
+        "the run stops there unless a factor of this part vanishes",
+        "end the run before that time, or limit the part, for example by min or max",
+        seen_before_run=True,
     )
 
 
@@ -208,24 +208,22 @@ def _times_within_run(times: set[float], start: float, end: float) -> Array:
 def _switches_risk(one: ActiveExpression, since: float) -> Risk:
     return Risk(
         "switches",
-        one.what,
-        f"{one.what} ({_quote_expression(one)}) switches too often for a step to end at every "
-        f"switching "
-        f"time: from t = {since:.6g} s on some are missed",
+        one.description,
+        f"{one.description} ({_quote_expression(one)}) switches too often for steps to end at "
+        f"every switch: some are missed from t = {since:.6g} s on",
         "give max_step, or a shorter run",
-        before=True,
+        seen_before_run=True,
     )
 
 
 def _narrow_load_risk(one: ActiveExpression, longest: float) -> Risk:
     return Risk(
         "narrow-load",
-        one.what,
-        f"{one.what} ({_quote_expression(one)}) changes too often to be examined completely "
-        f"before the "
-        f"run; steps stay below {longest:.2g} s where it was not examined",
+        one.description,
+        f"{one.description} ({_quote_expression(one)}) changes too often to be examined completely "
+        f"before the run; steps are limited to {longest:.2g} s where it was not examined",
         "give max_step",
-        before=True,
+        seen_before_run=True,
     )
 
 

@@ -26,9 +26,11 @@ class BodyReferences(Collection[str]):
 
         Chain members get their index; synonyms of other programs are resolved.
         """
-        return self._known(reference) or self._known(self.scene.names.reference(reference))
+        return self._find_canonical(reference) or self._find_canonical(
+            self.scene.names.reference(reference)
+        )
 
-    def _known(self, reference: str) -> str | None:
+    def _find_canonical(self, reference: str) -> str | None:
         name, end_name = split_reference(reference)
         index = self.bodies.find(name)
         ends = self.bodies.ends(name)
@@ -36,7 +38,7 @@ class BodyReferences(Collection[str]):
             return None
         return self.bodies.name(index) + (f".{end_name}" if end_name else "")
 
-    def place(self, reference: str) -> str:
+    def canonical_name(self, reference: str) -> str:
         """Canonical name of a body, an end or the ground; raises SceneError if unknown."""
         canonical_name = self.canonical(reference)
         if canonical_name is not None:

@@ -25,22 +25,22 @@ class HasScales(Protocol):
     @property
     def scene(self) -> Scene: ...
     @property
-    def layout(self) -> Layout: ...
+    def coordinate_layout(self) -> Layout: ...
     @property
-    def flexible(self) -> Mapping[str, ModalBody]: ...
+    def flexible_bodies(self) -> Mapping[str, ModalBody]: ...
     @property
     def nu(self) -> int: ...
 
 
 def speed_scales(model: HasScales) -> Array:
     """Characteristic scales (nu,) of the speeds: 1 rad, the scene length (m), or modal sizes."""
-    layout, scales = model.layout, np.ones(model.nu)
+    layout, scales = model.coordinate_layout, np.ones(model.nu)
     length = scene_length(model)
     for slots in layout.hinges.values():
         is_length = [unit.startswith("m") for unit in slots.u_units]
         scales[slots.u_slice] = np.where(is_length, length, 1.0)
     for name, slots in layout.modal.items():
-        scales[slots.u_slice] = modal_sizes(model.flexible[name])
+        scales[slots.u_slice] = modal_sizes(model.flexible_bodies[name])
     return scales
 
 
@@ -54,8 +54,8 @@ def scene_length(model: HasScales) -> float:
     positions += [chain.position for chain in scene.chain]
     for body in (*scene.body, *(inner_body for chain in scene.chain for inner_body in chain.body)):
         positions += [body.center_of_mass, *(end.position for end in body.ends.values())]
-    lengths = [float(np.linalg.norm(place)) for place in positions]
-    lengths += [radius_of_gyration(body) for body in model.flexible.values()]
+    lengths = [float(np.linalg.norm(position)) for position in positions]
+    lengths += [radius_of_gyration(body) for body in model.flexible_bodies.values()]
     length = max(lengths, default=0.0)
     rigid = [body for body in scene.bodies.by_name.values() if hasattr(body, "inertia")]
     radii = [
@@ -73,7 +73,7 @@ def total_mass(model: HasScales) -> float:
     scene = model.scene
     mass = sum(body.mass for body in scene.body)
     mass += sum(chain.body_of(k).mass for chain in scene.chain for k in range(chain.count))
-    for body in model.flexible.values():
+    for body in model.flexible_bodies.values():
         mass += sum(point.mass for point in body.points) if body.points else float(body.mass)
     return mass
 

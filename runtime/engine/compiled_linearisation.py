@@ -72,15 +72,15 @@ class LinearisationCode:
         self._engine, self._fusion, self._n = engine, fusion, len(free)
         self._local, self._lock = threading.local(), threading.Lock()
         self._library: FusedLibrary | None = None
-        self._looked, self._saved = False, 0.0
+        self._has_searched, self._saved_seconds = False, 0.0
 
-    def at(self, t: float, q: Array, u: Array) -> CompiledState | None:
+    def evaluate(self, t: float, q: Array, u: Array) -> CompiledState | None:
         """Evaluate one state; q (nq,) and u (nu,) must be contiguous.
 
         Returns None if there is no code or a guard fails; the looped engine then names the cause.
         """
-        call = self.call()
-        return None if call is None else call.at(t, q, u)
+        call = self.thread_call()
+        return None if call is None else call.evaluate(t, q, u)
 
     def state_matrix(self, about: CompiledState, turning: bool) -> Array | None:
         """State matrix A (2 n, 2 n) of d/dt (x, x') = A (x, x').
@@ -88,17 +88,17 @@ class LinearisationCode:
         x' = du or, with `turning`, G x + du.  Returns None without code, or if M is not positive
         definite.
         """
-        call = self.call(0.0)
+        call = self.thread_call(0.0)
         return None if call is None else call.state_matrix(about, turning)
 
-    def call(self, saved: float = 1.0) -> LinearisationCall | None:
+    def thread_call(self, saved: float = 1.0) -> LinearisationCall | None:
         """Call of this thread, or None without code; `saved` is the number of states saved."""
         if self._library is None and not self._expect(saved):
             return None
         try:
             call_of_thread: LinearisationCall = self._local.call
         except AttributeError:
-            call_of_thread = self._local.call = self._made()
+            call_of_thread = self._local.call = self._make_call()
         return call_of_thread
 
     def _expect(self, saved: float) -> bool:
@@ -107,16 +107,16 @@ class LinearisationCode:
             return False
         with self._lock:
             pair_count = self._engine.nu**2
-            self._saved += saved * (_SECONDS_SAVED + _SECONDS_SAVED_PER_PAIR * pair_count)
-            is_worthwhile = self._saved > _SECONDS_PER_PAIR * pair_count
-            if self._library is None and (is_worthwhile or not self._looked):
-                self._looked = True
+            self._saved_seconds += saved * (_SECONDS_SAVED + _SECONDS_SAVED_PER_PAIR * pair_count)
+            is_worthwhile = self._saved_seconds > _SECONDS_PER_PAIR * pair_count
+            if self._library is None and (is_worthwhile or not self._has_searched):
+                self._has_searched = True
                 self._library = self._fusion.ready_linear(is_worthwhile)
                 if is_worthwhile:  # compile only once: a second attempt would give the same result
-                    self._saved = -np.inf
+                    self._saved_seconds = -np.inf
             return self._library is not None
 
-    def _made(self) -> LinearisationCall:
+    def _make_call(self) -> LinearisationCall:
         assert self._library is not None
         live = LiveInputs(self._engine.packed.system, self._fusion.inputs)
         return LinearisationCall(self._engine, self._library, self._fusion.numbers, live, self._n)
@@ -131,7 +131,7 @@ class LinearisationCall:
         self._ffi, self._lib, self._n, self._nu = engine.ffi, engine.lib, n, engine.nu
         work_size = n * (n + engine.lib.MSTMM_TILE_COLUMNS)
         p, memory, zero_efforts = np.array(numbers), engine.start_memory(), np.zeros(engine.nu)
-        self._kept = (
+        self._references = (
             library,
             live,
             *map(engine.pointer, (p, memory, zero_efforts, np.empty(work_size))),
@@ -139,15 +139,15 @@ class LinearisationCall:
         self._real = engine.ffi.typeof("double[]")
         self._record = record = engine.ffi.new("mstmm_linear_code *")
         record.fused, record.n = library.descriptor, n
-        record.p, record.memory, self._no_efforts, record.work = self._kept[2:]
+        record.p, record.memory, self._no_efforts, record.work = self._references[2:]
         if live.varies:
-            self._places: NDArray[np.int32] = live.places
-            record.live.n, record.live.inputs = len(live.places), engine.packed.model.inputs
-            record.live.places = engine.ffi.from_buffer("int[]", self._places)
+            self._input_indices: NDArray[np.int32] = live.indices
+            record.live.n, record.live.inputs = len(live.indices), engine.packed.model.inputs
+            record.live.places = engine.ffi.from_buffer("int[]", self._input_indices)
         self._numbers = int(engine.lib.mstmm_linear_numbers(record))
-        self.derivatives = self._prepared(engine, self._numbers)
+        self.derivatives = self._prepare(engine, self._numbers)
 
-    def _prepared(self, engine: LoopedEngine, numbers: int) -> Prepared:
+    def _prepare(self, engine: LoopedEngine, numbers: int) -> Prepared:
         """Prepared call on t, q (nq,) and u (nu,) of a scene without drives.
 
         It returns udot, its derivatives -M^-1 K, -M^-1 C, M^-1 and -M^-1 r_t, then G and the
@@ -168,10 +168,10 @@ class LinearisationCall:
             (n, n),
             (n, n),
             numbered=True,
-            kept=(self._kept, result_pointer),
+            kept=(self._references, result_pointer),
         )
 
-    def at(self, t: float, q: Array, u: Array) -> CompiledState | None:
+    def evaluate(self, t: float, q: Array, u: Array) -> CompiledState | None:
         """Evaluate one state; see `LinearisationCode.at`."""
         buffer, real = self._ffi.from_buffer, self._real
         numbers = np.empty(self._numbers)
@@ -181,7 +181,7 @@ class LinearisationCall:
         )  # fmt: skip
         return None if is_failed else CompiledState(numbers, self._nu, self._n)
 
-    def with_slopes(
+    def evaluate_with_derivatives(
         self, t: float, q: Array, u: Array, efforts: Array | None = None
     ) -> tuple[CompiledState, Array] | None:
         """Evaluate one state, with the derivatives (n, 3 n + 1) of the accelerations.

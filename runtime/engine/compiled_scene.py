@@ -14,7 +14,7 @@ from ..kernels import kernel_store
 from ..packing import product_sweep
 from ..packing import scene_parameters as named_parameters
 from ..packing.coordinate_layout import Layout
-from ..packing.merging.simplification import LINKED, Simplification, Words
+from ..packing.merging.simplification import LINKED, Simplification, SimplifyOptions
 from ..packing.packed_scene import PackedScene, resize_workspace
 from ..packing.scene_elements import Known
 from ..packing.scene_packing import pack, without_merging
@@ -29,7 +29,9 @@ from .loops.independent_speeds import IndependentSpeeds
 from .loops.loop_analysis import LoopStart
 
 #: Options of a compilation: fused code, accuracy of the plain product, sweep, simplifications.
-CompileOptions = tuple[Callable[[PackedScene, Known], FusedCode] | None, float | None, str, Words]
+CompileOptions = tuple[
+    Callable[[PackedScene, Known], FusedCode] | None, float | None, str, SimplifyOptions
+]
 
 
 class CompiledScene:
@@ -51,7 +53,7 @@ class CompiledScene:
         fusing: Callable[[PackedScene, Known], FusedCode] | None = None,
         product_accuracy: float | None = None,
         sweep: str = "riccati",
-        simplify: Words = LINKED,
+        simplify: SimplifyOptions = LINKED,
     ) -> None:
         self.scene = scene
         self._fusing, self._product_accuracy, self.sweep = fusing, product_accuracy, sweep
@@ -59,45 +61,54 @@ class CompiledScene:
         self.looped = LoopedEngine(
             pack(scene, known, product_accuracy, sweep=sweep, simplify=self._simplify)
         )
-        self.known = self.packed.elements.known
-        self.closed: LoopStart | None = None
-        if self.packed.system.closes:
+        self.known = self.packed_scene.elements.known
+        self.loop_start: LoopStart | None = None
+        if self.packed_scene.system.has_loops:
             try:
-                self.closed = LoopStart(self.looped, len(self.free_speeds))
+                self.loop_start = LoopStart(self.looped, len(self.free_speed_indices))
             except NumericalFailure as failure:
                 raise SceneError(f"scene: {failure}") from None
-            self.looped = self.closed.engine
+            self.looped = self.loop_start.engine
             if product_accuracy is not None:
-                product_sweep.enable_product_sweep(self.packed, product_accuracy)
-                resize_workspace(self.packed, self.packed.written.slots)
-        elif self.packed.refined:
-            self.packed.model.refines = count_tree_refinements(self.looped)
-        self.fusion: FusedCode = fusing(self.packed, self.known) if fusing else NoFusedCode()
+                product_sweep.enable_product_sweep(self.packed_scene, product_accuracy)
+                resize_workspace(self.packed_scene, self.packed_scene.written.slots)
+        elif self.packed_scene.refined:
+            self.packed_scene.model.refines = count_tree_refinements(self.looped)
+        self.fusion: FusedCode = fusing(self.packed_scene, self.known) if fusing else NoFusedCode()
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the scene and its options; unpickling searches for compiled code again."""
-        return _unpickle, (type(self), self.scene, self._asked, self.fusion.library is not None)
+        return _unpickle, (
+            type(self),
+            self.scene,
+            self._compile_options,
+            self.fusion.library is not None,
+        )
 
     @property
-    def _asked(self) -> CompileOptions:
+    def _compile_options(self) -> CompileOptions:
         return self._fusing, self._product_accuracy, self.sweep, self._simplify
 
     @cached_property
-    def apart(self) -> LoopedEngine:
+    def unmerged_engine(self) -> LoopedEngine:
         """Looped engine without merging, for quantities of merged bodies or hinges."""
-        packed = without_merging(self.packed)
-        if packed is self.packed:
+        packed = without_merging(self.packed_scene)
+        if packed is self.packed_scene:
             return self.looped
         engine = LoopedEngine(packed)
-        return engine if self.closed is None else LoopStart(engine, len(self.free_speeds)).engine
+        return (
+            engine
+            if self.loop_start is None
+            else LoopStart(engine, len(self.free_speed_indices)).engine
+        )
 
     @property
     def simplifications(self) -> tuple[Simplification, ...]:
         """Simplifications of the packed scene; they do not change its motion."""
-        return self.packed.simplified
+        return self.packed_scene.simplified
 
     @property
-    def packed(self) -> PackedScene:
+    def packed_scene(self) -> PackedScene:
         """Packed scene; its numbers refer to internal frames."""
         return self.looped.packed
 
@@ -107,7 +118,7 @@ class CompiledScene:
         return "looped" if self.fusion.library is None else "fused"
 
     @property
-    def engine_choice(self) -> str:
+    def engine_reason(self) -> str:
         """Engine in use, with the reason."""
         fused_code = self.fusion
         if fused_code.library is not None:
@@ -117,39 +128,39 @@ class CompiledScene:
         return "looped: fused code of this scene is not compiled yet; a long run or batch builds it"
 
     @property
-    def layout(self) -> Layout:
+    def coordinate_layout(self) -> Layout:
         """Layout of hinges and modes in q and u."""
-        return self.packed.layout
+        return self.packed_scene.layout
 
     @property
-    def flexible(self) -> Mapping[str, ModalBody]:
+    def flexible_bodies(self) -> Mapping[str, ModalBody]:
         """Data of the flexible bodies by name: modes, moments, stiffness, interface nodes."""
-        return self.packed.flexible
+        return self.packed_scene.flexible
 
     @cached_property
-    def free_speeds(self) -> tuple[int, ...]:
+    def free_speed_indices(self) -> tuple[int, ...]:
         """Indices in u of the speeds that no drive prescribes."""
         indices = list[int]()
-        for number, hinge in enumerate(self.packed.scene.hinges):
-            slots = self.layout.slots(number)
+        for number, hinge in enumerate(self.packed_scene.scene.hinges):
+            slots = self.coordinate_layout.slots(number)
             drive = hinge.drive or (None,) * slots.nu
             if not hinge.is_weld:
                 indices += [slots.u + k for k in range(slots.nu) if drive[k] is None]
-        for slots in self.layout.modal.values():
+        for slots in self.coordinate_layout.modal.values():
             indices += range(slots.u, slots.u + slots.nu)
         return tuple(indices)
 
     @cached_property
-    def increments(self) -> tuple[tuple[str, str], ...]:
+    def tangent_increments(self) -> tuple[tuple[str, str], ...]:
         """Name and unit of the tangent increment of every free speed.
 
         If a speed is the rate of a coordinate, they are those of the coordinate.
         """
         names_and_units = list[tuple[str, str]]()
-        for speed in self.free_speeds:
-            slots = self.layout.hinge_of_speed(speed)
+        for speed in self.free_speed_indices:
+            slots = self.coordinate_layout.hinge_of_speed(speed)
             k = speed - slots.u
-            if slots.straight:
+            if slots.rates_are_speeds:
                 names_and_units.append((f"{slots.name}.{slots.q_names[k]}", slots.q_units[k]))
             else:
                 unit = slots.u_units[k].removesuffix("/s")
@@ -157,23 +168,27 @@ class CompiledScene:
         return tuple(names_and_units)
 
     @cached_property
-    def freedom(self) -> IndependentSpeeds | None:
+    def independent_speeds(self) -> IndependentSpeeds | None:
         """Independent speeds of closed loops; None for a tree."""
-        if self.closed is None:
+        if self.loop_start is None:
             return None
-        return IndependentSpeeds(self.looped, self.free_speeds, speed_scales(self), self.closed)
+        return IndependentSpeeds(
+            self.looped, self.free_speed_indices, speed_scales(self), self.loop_start
+        )
 
     @cached_property
-    def slopes(self) -> LinearisationCode:
+    def compiled_linearisation(self) -> LinearisationCode:
         """Linearisation of the scene by fused code."""
-        return LinearisationCode(self.looped, self.fusion, self.free_speeds)
+        return LinearisationCode(self.looped, self.fusion, self.free_speed_indices)
 
     @property
     def nq(self) -> int:
+        """Number of coordinates."""
         return self.looped.nq
 
     @property
     def nu(self) -> int:
+        """Number of speeds."""
         return self.looped.nu
 
     @property
@@ -202,10 +217,10 @@ class CompiledScene:
         """
         values = apply_without_recompile(self.scene, inputs)
         if values is not None:
-            return self.renewed(with_input_values(self.packed, values))
+            return self.with_packed_scene(with_input_values(self.packed_scene, values))
         return self._with(scene_with_inputs(self.scene, inputs))
 
-    def renewed(self, packed: PackedScene) -> Self:
+    def with_packed_scene(self, packed: PackedScene) -> Self:
         """Copy of this model for a packed scene with other inputs, without validation.
 
         The packed scene must match the existing compiled code.
@@ -215,27 +230,24 @@ class CompiledScene:
             if not isinstance(getattr(type(self), name, None), cached_property)
         }  # fmt: skip
         copy = object.__new__(type(self))
-        copy.__dict__.update(attributes, scene=packed.described, looped=LoopedEngine(packed))
-        copy.fusion = self.fusion.under(packed.system)
+        copy.__dict__.update(attributes, scene=packed.user_scene, looped=LoopedEngine(packed))
+        copy.fusion = self.fusion.for_system(packed.system)
         return copy
 
     def _with(self, scene: Scene) -> Self:
         """Compile the same scene with other numbers and the same options."""
-        recompiled = type(self)(scene, self.known, *self._asked)
+        recompiled = type(self)(scene, self.known, *self._compile_options)
         recompiled.fusion.follow(self.fusion)
         return recompiled
 
 
 def _unpickle(
-    kind: type[CompiledScene],
-    scene: Scene,
-    asked: CompileOptions,
-    fused: bool,
+    kind: type[CompiledScene], scene: Scene, options: CompileOptions, fused: bool
 ) -> CompiledScene:
     """Restore a pickled model, with its fused code if the local cache contains it."""
     known, definitions = kernel_store.load_known(kernel_store.required_types(scene))
     scene.check_types(definitions)
-    model = kind(scene, known, *asked)
+    model = kind(scene, known, *options)
     if fused:
         model.fusion.find()
     return model

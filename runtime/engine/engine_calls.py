@@ -81,30 +81,30 @@ class EngineCalls:
         """Initial memory: no releases, no turns counted, stored inputs at their initial values."""
         system = self.packed.system
         memory = np.zeros(max(1, system.n_memory))
-        memory[system.held.first : system.n_memory] = system.held.start
+        memory[system.held_inputs.first : system.n_memory] = system.held_inputs.start
         return memory
 
     @cached_property
-    def inertia_alone(self) -> Self:
+    def inertia_only(self) -> Self:
         """Calls on the same tree without gravity, laws, drives and loads."""
-        return self._pulled((0.0, 0.0, 0.0))
+        return self._with_gravity((0.0, 0.0, 0.0))
 
     @cached_property
-    def weighed(self) -> Self:
+    def gravity_only(self) -> Self:
         """Calls on the same tree with its gravity, without laws, drives and loads."""
-        return self._pulled(tuple(self.packed.model.gravity))
+        return self._with_gravity(tuple(self.packed.model.gravity))
 
     @cached_property
-    def pulled(self) -> tuple[Self, ...]:
-        """Calls like `weighed`, with gravity of 1 m/s^2 along each inertial axis."""
-        return tuple(self._pulled(tuple(row)) for row in np.eye(3).tolist())
+    def unit_gravity(self) -> tuple[Self, ...]:
+        """Calls like `gravity_only`, with gravity of 1 m/s^2 along each inertial axis."""
+        return tuple(self._with_gravity(tuple(row)) for row in np.eye(3).tolist())
 
-    def _pulled(self, gravity: tuple[float, ...]) -> Self:
+    def _with_gravity(self, gravity: tuple[float, ...]) -> Self:
         model = self.ffi.new("mstmm_model *", self.packed.model[0])
         model.gravity = list(gravity)
         model.n_laws = model.n_drives = model.n_values = 0
         model.n_loads = model.n_forces = 0
-        model.needs_pose = int(self.packed.system.closes)
+        model.needs_pose = int(self.packed.system.has_loops)
         model.product = self.ffi.NULL
         return type(self)(replace(self.packed, model=model))
 
@@ -192,9 +192,9 @@ class EngineCalls:
     def hinge_name(self, position: int) -> str:
         """Name of the inboard hinge of the body at a topology index."""
         packed = self.packed
-        return packed.scene.hinges.name(packed.topology.at(position)[1])
+        return packed.scene.hinges.name(packed.topology.scene_indices(position)[1])
 
-    def closing(self, position: int) -> str:
+    def closing_label(self, position: int) -> str:
         """Label of the element that closes a loop with the frame at a topology index."""
         name, _, table = self.hinge_name(position).partition("/")
         return f'{table or "hinge"} "{name}"'
@@ -207,7 +207,7 @@ class EngineCalls:
     def body_name(self, position: int) -> str:
         """Name of the body at a topology index."""
         packed = self.packed
-        return packed.scene.bodies.name(packed.topology.at(position)[0])
+        return packed.scene.bodies.name(packed.topology.scene_indices(position)[0])
 
     def failure_text(self, failure: Any, t: float) -> str:
         """Message for a failure of the engine: element, time, cause, remedy."""

@@ -21,7 +21,7 @@ class ElementNames(Protocol):
     def hinge_name(self, position: int, /) -> str: ...
     def body_name(self, position: int, /) -> str: ...
     def is_flexible(self, position: int, /) -> bool: ...
-    def closing(self, position: int, /) -> str: ...
+    def closing_label(self, position: int, /) -> str: ...
 
 
 def failure_text(engine: ElementNames, reason: int, element: int, code: int, t: float) -> str:
@@ -35,16 +35,17 @@ def _undetermined_text(engine: ElementNames, element: int, at: str, code: int) -
     if engine.is_flexible(element):
         body = engine.body_name(element).split("/")[0]
         return (
-            f'hinge "{hinge}" {at}: what it moves has no positive inertia left: the shapes of the '
-            f'flexible body "{body}" take all of it, or its deflection is beyond the stiffened '
-            'model; use fewer shapes, frame = "chord" or "mean", quadrature = true, or split it '
-            "into welded beams"
+            f'hinge "{hinge}" {at}: no positive inertia remains along its motion: the shapes of '
+            f'flexible body "{body}" represent all of it, or its deflection is too large for the '
+            'stiffened model; use fewer shapes, frame = "chord" or "mean", quadrature = true, or '
+            "split it into welded beams"
         )
     return (
-        f'hinge "{hinge}" {at}: a motion of it is undetermined, because what it carries has no '
-        "positive inertia in that direction (a thin rod on a ball, a point mass, collinear axes, "
-        "three angles at their lock, a negative principal moment); give the body inertia, give the "
-        "hinge rotor inertia (law.inertia), fix that motion, or use a ball hinge for three angles"
+        f'hinge "{hinge}" {at}: its motion is undetermined, because the outboard bodies have no '
+        "positive inertia along it (a thin rod on a ball hinge, a point mass, collinear axes, "
+        "gimbal lock of three angles, a negative principal moment); give the body inertia, give "
+        "the hinge rotor inertia (law.inertia), fix that motion, or use a ball hinge for three "
+        "angles"
     )
 
 
@@ -53,13 +54,11 @@ def _force_text(engine: ElementNames, element: int, at: str, code: int) -> str:
     if isinstance(force, Bushing):
         return (
             f'bushing "{force.name}" {at}: its ends are rotated by more than 170 degrees from '
-            f"rest, "
-            "beyond its law; make it stiffer, or replace it by a hinge with a law"
+            "rest, the limit of its law; make it stiffer, or replace it by a hinge with a law"
         )
     return (
         f'spring "{force.name}" {at}: its direction is undefined because its ends coincide; move '
-        f"one "
-        "of them, or replace it by an elastic hinge or a bushing"
+        "one of them, or replace it by an elastic hinge or a bushing"
     )
 
 
@@ -71,14 +70,14 @@ def _hinge_text(engine: ElementNames, element: int, at: str, code: int) -> str:
     name = engine.hinge_name(element)
     if name.endswith(OF_CONSTRAINT):
         curve = name.removesuffix(OF_CONSTRAINT)
-        return f'constraint "{curve}" {at}: its curve, or a slope of it, is not finite there'
-    return f'hinge "{name}" {at}: its definition fails in this state'
+        return f'constraint "{curve}" {at}: its curve or a derivative of it is not finite'
+    return f'hinge "{name}" {at}: its definition cannot be evaluated at this state'
 
 
 def _product_pivot_text(engine: ElementNames, element: int, at: str, code: int) -> str:
     return (
         f'hinge "{engine.hinge_name(element)}" {at}: the pivot of its classical matrix vanishes, '
-        'so the product does not exist in this state; use sweep = "riccati"'
+        'so that the product does not exist at this state; use sweep = "riccati"'
     )
 
 
@@ -93,8 +92,8 @@ def _product_error_text(engine: ElementNames, element: int, at: str, code: int) 
 def _section_text(engine: ElementNames, element: int, at: str, code: int) -> str:
     name = engine.hinge_name(element).replace("/", ".")
     return (
-        f'"{name}" {at}: a section turns by more than 1.5 rad against its floating frame, far '
-        "beyond small deflections; split the body into several that are welded together"
+        f'"{name}" {at}: a section rotates by more than 1.5 rad relative to its floating frame, '
+        "the limit of small deflections; split the body into several welded bodies"
     )
 
 
@@ -115,14 +114,14 @@ def _tangent_text(engine: ElementNames, element: int, at: str, code: int) -> str
             "step, or give the motion inertia (law.inertia) or a spring"
         )
     return (
-        f"{subject} {at}: the equations of an implicit step leave a motion undetermined: it has no "
+        f"{subject} {at}: a motion is undetermined in the equations of an implicit step: it has no "
         "inertia, stiffness or damping, or a negative stiffness cancels them; use a shorter step, "
         "or give the motion inertia (law.inertia) or a spring"
     )
 
 
 def _controller_text(engine: ElementNames, element: int, at: str, code: int) -> str:
-    name = engine.packed.described.controller[element].name
+    name = engine.packed.user_scene.controller[element].name
     return (
         f'controller "{name}" {at}: its measurement or output is not finite; check whether the '
         "closed loop is stable, perhaps with a shorter sample_time"
@@ -130,35 +129,35 @@ def _controller_text(engine: ElementNames, element: int, at: str, code: int) -> 
 
 
 def _loop_text(engine: ElementNames, element: int, at: str, code: int) -> str:
-    remedy = engine.packed.behind() or (
+    remedy = engine.packed.find_loop_cause() or (
         "start from model.assemble(q, u), or check whether links are stretched out in line "
         "(model.loops.singular), or a drive requires a motion that the mechanism cannot make"
     )
     return (
-        f"{engine.closing(element)} {at}: the loop that it closes is open, and no state near "
-        f"closes it; {remedy}"
+        f"{engine.closing_label(element)} {at}: its loop is open, and no nearby state closes it; "
+        f"{remedy}"
     )
 
 
 def _coupling_text(engine: ElementNames, element: int, at: str, code: int) -> str:
     return (
         f'coupling "{engine.packed.system.couplings[element].name}" {at}: it is not satisfied, and '
-        "no state near satisfies it; check whether drives or other couplings contradict it"
+        "no nearby state satisfies it; check whether drives or other couplings contradict it"
     )
 
 
 def _flat_disc_text(engine: ElementNames, element: int, at: str, code: int) -> str:
     return (
-        f"{engine.closing(element)} {at}: the disc is flat on its plane and touches it in more "
-        "than a point; end the run before that by an [[event]], or start it upright"
+        f"{engine.closing_label(element)} {at}: the disc is flat on its plane and touches it in "
+        "more than one point; end the run before that by an [[event]], or start it upright"
     )
 
 
 def _bounce_text(engine: ElementNames, element: int, at: str, code: int) -> str:
     return (
-        f"{engine.packed.described.happening(element)} {at}: no motion can respond to its "
-        "impact, because what it hits is driven or held; use another place for the bounce, or "
-        "release the hinge"
+        f"{engine.packed.user_scene.event_label(element)} {at}: no motion can respond to its "
+        "impact, because the bodies in contact are driven or fixed; move the bounce to another "
+        "body, or release the hinge"
     )
 
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 _END_DISTANCE = 1e-6
 
 #: Remedy at the end of messages that name an expression.
-REMEDY = "keep it finite where the motion goes"
+REMEDY = "keep it finite along the motion"
 
 
 def find_nonfinite_expression(engine: EngineCalls, t: float, q: Array, u: Array) -> str:
@@ -35,11 +35,11 @@ def find_nonfinite_expression(engine: EngineCalls, t: float, q: Array, u: Array)
     of zero length; ignores expressions that the engine does not evaluate.
     """
     model = engine.packed.model
-    scene, layout = engine.packed.described, engine.packed.layout
+    scene, layout = engine.packed.user_scene, engine.packed.layout
     for first in layout.quaternions:
         if not np.linalg.norm(q[first : first + 4]) > 0:
             return (
-                f"the quaternion that begins with {layout.q_name(int(first))} has zero length at "
+                f"the quaternion starting at {layout.q_name(int(first))} has zero length at "
                 f"t = {t:.9g} s; the identity rotation is 1, 0, 0, 0"
             )
     for location, drive in _drive_expressions(scene) if model.n_drives else ():
@@ -57,7 +57,8 @@ def find_nonfinite_expression(engine: EngineCalls, t: float, q: Array, u: Array)
 def find_nonfinite_derivative(engine: EngineCalls, t: float, q: Array, u: Array) -> str:
     """Message that names an expression with a non-finite derivative at a state, or "".
 
-    Example: 'hinge "pin": law.effort[0] = "sqrt(q)" has no finite slope along q at t = 0 s'.  Only
+    Example: 'hinge "pin": law.effort[0] = "sqrt(q)" has no finite derivative with respect to q at
+    t = 0 s'.  Only
     derivatives that implicit methods need are tested.
     """
     for location, expression, values in _expressions_with_values(engine, t, q, u):
@@ -65,9 +66,9 @@ def find_nonfinite_derivative(engine: EngineCalls, t: float, q: Array, u: Array)
             is_state_dependent = name.text == "t" or name.quantity in ("q", "u")
             if is_state_dependent and not math.isfinite(slope):
                 return (
-                    f"{_quote_expression(location, expression)} has no finite slope along "
-                    f"{name.text} at "
-                    f"t = {t:.9g} s, which implicit methods need; make it smooth there, such as "
+                    f"{_quote_expression(location, expression)} has no finite derivative "
+                    f"with respect to {name.text} at t = {t:.9g} s, which implicit methods need; "
+                    "make it smooth there, such as "
                     "sqrt(abs(u) + 1e-6) for sqrt(abs(u)), or use an explicit method such as "
                     "dop853"
                 )
@@ -80,18 +81,18 @@ def describe_curve_end(engine: EngineCalls, t: float, q: Array, u: Array, ahead:
     Example: 'constraint "wire": curve[1] = "sqrt(1-s)" ends at s = 1, ...'.
     """
     expression_values = _ExpressionValues(engine, t, q, u)
-    for constraint in engine.packed.described.constraint if engine.packed.system.closes else ():
+    for constraint in engine.packed.user_scene.constraint if engine.packed.system.has_loops else ():
         for k, entry in enumerate(constraint.curve or ()):
             s, rate = (
-                expression_values.along(f"{constraint.name}.{name}") for name in ("s", "s_rate")
+                expression_values.curve_parameter(f"{constraint.name}.{name}")
+                for name in ("s", "s_rate")
             )
             end_s = _curve_end(partial(_curve_value, entry), s, rate, ahead)
             if end_s is not None:
                 location = _quote_expression(f'constraint "{constraint.name}": curve[{k}]', entry)
                 return (
                     f"{location} ends at s = {end_s:.9g}, which the motion reaches near t = "
-                    f"{t:.9g} s; "
-                    f"{REMEDY}, or stop the run before that by an [[event]]"
+                    f"{t:.9g} s; {REMEDY}, or stop the run before that by an [[event]]"
                 )
     return ""
 
@@ -179,25 +180,25 @@ def _expressions_with_values(
 
     Yields location, expression and a function from the names in it to their values at a state.
     """
-    model, scene = engine.packed.model, engine.packed.described
+    model, scene = engine.packed.model, engine.packed.user_scene
     expression_values = _ExpressionValues(engine, t, q, u)
     for location, expression, hinge in _effort_expressions(scene) if model.n_values else ():
-        yield location, expression, partial(expression_values.of, own=hinge)
+        yield location, expression, partial(expression_values.value, own=hinge)
     for spring in scene.spring if model.n_forces else ():
         effort = spring.law.effort
         if not effort.is_constant:
             location = f'spring "{spring.name}": law.effort'
-            yield location, effort, partial(expression_values.of_spring, own=spring)
+            yield location, effort, partial(expression_values.spring_value, own=spring)
     for coupling in scene.coupling if model.n_couplings else ():
         location = f'coupling "{coupling.name}": '
-        yield f"{location}{coupling.key}", coupling.row, expression_values.of_coupling
+        yield f"{location}{coupling.key}", coupling.row, expression_values.coupling_value
         if coupling.equals is not None:
-            yield f"{location}equals", coupling.equals, partial(expression_values.of, own=None)
+            yield f"{location}equals", coupling.equals, partial(expression_values.value, own=None)
     for constraint in scene.constraint:
         for k, entry in enumerate(constraint.curve or ()):
             if not entry.is_constant:
                 location = f'constraint "{constraint.name}": curve[{k}]'
-                yield location, entry, partial(expression_values.of_curve, own=constraint)
+                yield location, entry, partial(expression_values.curve_value, own=constraint)
 
 
 class _ExpressionValues:
@@ -206,7 +207,7 @@ class _ExpressionValues:
     def __init__(self, engine: EngineCalls, t: float, q: Array, u: Array) -> None:
         self.engine, self.t, self.q, self.u = engine, t, q, u
 
-    def of(self, name: Name, own: Hinge | None) -> float:
+    def value(self, name: Name, own: Hinge | None) -> float:
         """Value of t, an input, q, u, s or s_rate, or a parameter of the hinge `own`."""
         if name.text == "t":
             return self.t
@@ -214,7 +215,7 @@ class _ExpressionValues:
         if name.text in inputs:
             return inputs[name.text].value(self.t)
         if name.hinge and name.quantity in ("s", "s_rate"):
-            return self.along(name.text)
+            return self.curve_parameter(name.text)
         if name.quantity not in ("q", "u") and own is not None:
             return own.parameters[name.quantity]
         slots = self.engine.packed.layout.hinges[name.hinge or (own.name if own else "")]
@@ -222,34 +223,34 @@ class _ExpressionValues:
         state_vector, first = (self.q, slots.q) if name.quantity == "q" else (self.u, slots.u)
         return float(state_vector[first + index])
 
-    def of_coupling(self, name: Name) -> float:
+    def coupling_value(self, name: Name) -> float:
         """Value of the coordinate or speed to which a name in a coupling refers."""
-        scene = self.engine.packed.described
+        scene = self.engine.packed.user_scene
         number, quantity, entry = resolve_coordinate(scene, name)
         slots = self.engine.packed.layout.hinges[scene.hinges.name(number)]
         return float(self.q[slots.q + entry] if quantity == "q" else self.u[slots.u + entry])
 
-    def of_curve(self, _: Name, own: Constraint) -> float:
+    def curve_value(self, _: Name, own: Constraint) -> float:
         """Curve parameter s of a constraint, the only name in its expressions."""
-        return self.along(f"{own.name}.s")
+        return self.curve_parameter(f"{own.name}.s")
 
-    def along(self, name: str) -> float:
+    def curve_parameter(self, name: str) -> float:
         """Curve parameter s of a constraint, or its rate, by name."""
         layout = self.engine.packed.layout
         if name in (names := layout.q_names):
             return float(self.q[names.index(name)])
         return float(self.u[layout.u_names.index(name)])
 
-    def of_spring(self, name: Name, own: Spring) -> float:
+    def spring_value(self, name: Name, own: Spring) -> float:
         """Value of a name in a spring law, in which q and u are the length and its rate."""
         if name.text not in ("q", "u"):
-            return self.of(name, None)
+            return self.value(name, None)
         length, rate = self._length(own)
         return length if name.text == "q" else rate
 
     def _length(self, spring: Spring) -> tuple[float, float]:
         """Length of a spring, m, and its rate, m/s, which is nan if the ends coincide."""
-        inertia_engine, probes = self.engine.inertia_alone, []
+        inertia_engine, probes = self.engine.inertia_only, []
         for reference in (spring.from_, spring.to):
             body, axes, offset = self.engine.packed.end(reference)
             probes.append(Probe(body, axes, spring.position if body < 0 else offset))

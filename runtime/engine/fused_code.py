@@ -10,7 +10,7 @@ import numpy as np
 
 from mstmm.array_validation import Array
 
-from .live_inputs import Places
+from .live_inputs import IndexPairs
 
 if TYPE_CHECKING:
     from ..kernels.derivative_library import DerivativeLibrary
@@ -28,12 +28,12 @@ class FusedCode(Protocol):
     `note` gives the origin of the library, `obstacle` the reason that none is possible.  `ready(n)`
     returns a library if it exists or if n evaluations justify a compiler run; `find()` never
     compiles; `build()` raises EnvironmentFailure if no library is possible.  `follow(other)` adopts
-    the libraries of the same scene with other numbers; `under(system)` is the code for a system
-    with other inputs.  `symbolic` is a linear model as formulas.
+    the libraries of the same scene with other numbers; `for_system(system)` is the code for a
+    system with other inputs.  `symbolic` is a linear model as formulas.
     """
 
     numbers: Array
-    inputs: Places
+    inputs: IndexPairs
     note: str
     obstacle: str
 
@@ -48,14 +48,14 @@ class FusedCode(Protocol):
     def find(self) -> FusedLibrary | None: ...
     def build(self) -> FusedLibrary: ...
     def follow(self, other: Any) -> None: ...
-    def under(self, system: System) -> Self: ...
+    def for_system(self, system: System) -> Self: ...
     def ready(self, evaluations: float) -> FusedLibrary | None: ...
     def ready_lanes(self, evaluations: float) -> FusedLibrary | None: ...
     def ready_implicit(self, evaluations: float) -> FusedLibrary | None: ...
     def ready_linear(self, pays: bool) -> FusedLibrary | None: ...
     def ready_inverse(self, calls: float) -> FusedLibrary | None: ...
     def ready_points(self, body: int, calls: float) -> FusedLibrary | None: ...
-    def fused(self, structure: Any) -> Any: ...
+    def structure_ir(self, structure: Any) -> Any: ...
     def columns(
         self, structure: Any, kernels: Callable[[], Any], what: str, build: bool
     ) -> DerivativeLibrary | None: ...
@@ -74,7 +74,7 @@ class NoFusedCode:
     inverse: FusedLibrary | None = None
     note: str = ""
     numbers: Array = field(default_factory=lambda: np.zeros(0))
-    inputs: Places = ()
+    inputs: IndexPairs = ()
 
     def find(self) -> None:
         return None
@@ -87,7 +87,7 @@ class NoFusedCode:
     def follow(self, other: Any) -> None:
         pass
 
-    def under(self, system: System) -> Self:
+    def for_system(self, system: System) -> Self:
         return self
 
     def ready(self, evaluations: float) -> None:
@@ -108,7 +108,7 @@ class NoFusedCode:
     def ready_points(self, body: int, calls: float) -> None:
         return None
 
-    def fused(self, structure: Any) -> Any:
+    def structure_ir(self, structure: Any) -> Any:
         return self.build()
 
     def columns(self, structure: Any, kernels: Callable[[], Any], what: str, build: bool) -> None:

@@ -32,7 +32,7 @@ class DynamicStiffnessBodies(NamedTuple):
     three rotations and three displacements, and on the n shapes.
     """
 
-    places: tuple[int, ...]
+    body_indices: tuple[int, ...]
     stiffness: Callable[[Complex], list[Complex]]
 
 
@@ -50,7 +50,7 @@ class HarmonicResponse:
     ) -> None:  # fmt: skip
         self.engine, self.tangent = engine, TangentMatrix(engine)
         self.tangent.residual(t, q, u, a)
-        nu, coupled_count, count = engine.nu, self.tangent.coupled, len(self.tangent.numbers)
+        nu, coupled_count, count = engine.nu, self.tangent.off_tree_count, len(self.tangent.numbers)
         lane_doubles = 2 * int(engine.lib.MSTMM_MOST_LANES)
         self._record = record = engine.ffi.new("mstmm_response *")
         record.at, record.lanes, record.n_numbers = self.tangent.record, lanes, count
@@ -58,7 +58,7 @@ class HarmonicResponse:
             self._stiffer = TangentMatrix(stiffer)
             self._stiffer.residual(t, q, u, a)
             record.stiffer = self._stiffer.record
-        self._kept = {
+        self._arrays = {
             "brought": _aligned_zeros(3 * count),
             "numbers": _aligned_zeros(lane_doubles * count),
             "workspace": _aligned_zeros(lane_doubles * engine.packed.workspace),
@@ -67,15 +67,15 @@ class HarmonicResponse:
             "answers": _aligned_zeros(lane_doubles * coupled_count * nu),
             "closure": _aligned_zeros(lane_doubles * coupled_count * (4 * coupled_count + 2)),
         }
-        for name, array in self._kept.items():
+        for name, array in self._arrays.items():
             setattr(record, name, engine.pointer(array))
         if engine.lib.mstmm_response_begin(record):
-            raise engine.failed(self.tangent.record.failure, t, *self.tangent.state)
+            raise engine.evaluation_error(self.tangent.record.failure, t, *self.tangent.state)
         self._exact = exact
         if exact is not None:
-            self._order = np.argsort(exact.places)[::-1]
-            self._kept_bodies = np.array(exact.places, dtype=np.int32)[self._order]
-            record.exact_bodies = engine.ffi.from_buffer("int[]", self._kept_bodies)
+            self._order = np.argsort(exact.body_indices)[::-1]
+            self._exact_body_indices = np.array(exact.body_indices, dtype=np.int32)[self._order]
+            record.exact_bodies = engine.ffi.from_buffer("int[]", self._exact_body_indices)
             record.n_exact = len(self._order)
 
     def amplitudes(self, s: Complex, columns: Array) -> tuple[Complex, Array, NDArray[np.int32]]:
@@ -108,9 +108,9 @@ class HarmonicResponse:
         self._record.exact = self.engine.pointer(stiffness_rows.view(np.float64))
         return stiffness_rows
 
-    def undamped(self) -> None:
+    def omit_damping(self) -> None:
         """Omit the terms linear in s in subsequent calls."""
-        self._kept["brought"][: len(self.tangent.numbers)] = 0.0
+        self._arrays["brought"][: len(self.tangent.numbers)] = 0.0
 
     def count_negative(self, squares: Array) -> Integers:
         """Number of negative pivots of a symmetric Z at every s^2 (k,) < 0; -1 for a zero pivot.

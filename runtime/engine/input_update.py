@@ -17,16 +17,16 @@ from ..packing.system_builder import has_timed_loads
 def with_input_values(packed: PackedScene, values: Mapping[str, float | str]) -> PackedScene:
     """Packed scene with other numbers or signals for inputs that no drive uses."""
     expanded = packed.expanded
-    described = expanded.described.with_inputs(values)
-    is_unexpanded = expanded.scene is expanded.described
+    described = expanded.user_scene.with_inputs(values)
+    is_unexpanded = expanded.scene is expanded.user_scene
     expanded_scene = described if is_unexpanded else expanded.scene.with_inputs(values)
     channels = described.channels
     time_inputs = has_timed_loads(expanded_scene, channels)
-    system = replace(packed.system, inputs=tuple(channels.values()), by_time=time_inputs)
+    system = replace(packed.system, inputs=tuple(channels.values()), depends_on_time=time_inputs)
     renewed_packed = _with_new_records(packed, system)
     renewed_packed.scene, renewed_packed.expanded = (
         expanded_scene,
-        replace(expanded, scene=expanded_scene, described=described),
+        replace(expanded, scene=expanded_scene, user_scene=described),
     )
     return renewed_packed
 
@@ -36,14 +36,16 @@ def with_held_inputs(packed: PackedScene, names: Sequence[str], t: float) -> Pac
 
     They are appended to the memory with their values at t (s) and may be set between steps.
     """
-    system, places = packed.system, list(packed.system.held.places)
-    start = [packed.described.channels[name].value(t) for name in names]
+    system, memory_indices = packed.system, list(packed.system.held_inputs.memory_indices)
+    start = [packed.user_scene.channels[name].value(t) for name in names]
     for k, name in enumerate(names):
-        places[packed.layout.inputs[name]] = system.n_memory + k
-    held = HeldInputs(system.held.first, tuple(places), (*system.held.start, *start))
-    system_with_memory = replace(system, held=held, n_memory=system.n_memory + len(names))
+        memory_indices[packed.layout.inputs[name]] = system.n_memory + k
+    held = HeldInputs(
+        system.held_inputs.first, tuple(memory_indices), (*system.held_inputs.start, *start)
+    )
+    system_with_memory = replace(system, held_inputs=held, n_memory=system.n_memory + len(names))
     renewed_packed = _with_new_records(packed, system_with_memory)
-    renewed_packed.held = packed.held | set(names)
+    renewed_packed.held_input_names = packed.held_input_names | set(names)
     return renewed_packed
 
 
@@ -56,7 +58,7 @@ def with_input_pieces(packed: PackedScene, named: Mapping[str, PiecewisePolynomi
     system = replace(
         packed.system,
         inputs=tuple(channels.values()),
-        by_time=has_timed_loads(packed.scene, channels),
+        depends_on_time=has_timed_loads(packed.scene, channels),
     )
     return _with_new_records(packed, system)
 
@@ -65,8 +67,8 @@ def _with_new_records(packed: PackedScene, system: System) -> PackedScene:
     slopes, memory = packed.slopes(), Memory(packed.ffi)  # computed once: the records are shared
     model = memory.new("mstmm_model *", packed.model[0])
     model.n_memory = system.n_memory
-    model.inputs = write_inputs(system.inputs, system.held.places, memory)
-    written = replace(packed.written, model=model, kept=[packed.written, *memory.kept])
+    model.inputs = write_inputs(system.inputs, system.held_inputs.memory_indices, memory)
+    written = replace(packed.written, model=model, keep_alive=[packed.written, *memory.keep_alive])
     return replace(
         packed, system=system, model=model, written=written, _time_maps={}, _slopes=slopes
     )

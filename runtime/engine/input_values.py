@@ -78,11 +78,10 @@ def scene_with_inputs(scene: Scene, inputs: Mapping[str, InputValue]) -> Scene:
 
 
 def _check_not_controlled(name: str, scene: Scene) -> None:
-    if name in scene.controlled:
+    if name in scene.controllers_by_input:
         raise SceneError(
-            f'{_input_label(name)}: controller "{scene.controlled[name]}" sets this input; add '
-            f"another to "
-            "the expression that reads it"
+            f'{_input_label(name)}: controller "{scene.controllers_by_input[name]}" sets this '
+            "input; add another input to the expression that reads it"
         )
 
 

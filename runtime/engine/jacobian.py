@@ -49,7 +49,7 @@ class OdeJacobian:
         self._outputs = ["qdot", "udot", *(["power"] if with_work else [])]
         self._tape, self._numbers = _tangent_kernel(model, self._outputs)
         #: Length of the memory that the kernel reads; stored inputs and controller states follow.
-        self._n_memory = model.packed.system.held.first
+        self._n_memory = model.packed_scene.system.held_inputs.first
 
     @property
     def exact(self) -> bool:
@@ -59,13 +59,13 @@ class OdeJacobian:
     def __call__(self, t: float, y: Array) -> Array:
         """Jacobian (n, n) at y (n,); columns that cannot be evaluated are zero."""
         if self._tape is not None:
-            jacobian = self._differentiated(self._tape, t, y)
+            jacobian = self._exact_jacobian(self._tape, t, y)
             if np.isfinite(jacobian).all():
                 return jacobian
-        jacobian = self._differenced(t, y)
+        jacobian = self._difference_jacobian(t, y)
         return np.where(np.isfinite(jacobian), jacobian, 0.0)
 
-    def _differentiated(self, tape: TapeKernel, t: float, y: Array) -> Array:
+    def _exact_jacobian(self, tape: TapeKernel, t: float, y: Array) -> Array:
         n, nq, nu = len(y), self._nq, len(y) - self._nq - (len(self._outputs) == 3)
         jacobian = np.zeros((n, n))
         unit_vectors = np.eye(nq + nu)
@@ -85,7 +85,7 @@ class OdeJacobian:
             jacobian[: len(column), j] = column
         return jacobian
 
-    def _differenced(self, t: float, y: Array) -> Array:
+    def _difference_jacobian(self, t: float, y: Array) -> Array:
         sizes = _DIFFERENCE_INCREMENT * np.maximum(1.0, np.abs(y))
         columns = [
             (self._rates(t, y + step) - self._rates(t, y - step)) / (2 * size)
@@ -96,12 +96,12 @@ class OdeJacobian:
 
 def _tangent_kernel(model: CompiledScene, outputs: list[str]) -> tuple[TapeKernel | None, Numbers]:
     """Tangent kernel with respect to q and u, or None, and the function for its numbers p."""
-    packed, added_elements = model.packed, model.known or {}
+    packed, added_elements = model.packed_scene, model.known or {}
     if packed.releases or packed.system.count > MAX_BODIES:
         return None, _no_numbers
     structure, numbers = structure_of(packed.system, added_elements, floors=packed.floors)
     try:
-        kernels = model.fusion.fused(structure).kernels
+        kernels = model.fusion.structure_ir(structure).kernels
     except (ElementError, EnvironmentFailure):
         return None, _no_numbers
     kernel = kernels["accelerations"]
@@ -110,7 +110,7 @@ def _tangent_kernel(model: CompiledScene, outputs: list[str]) -> tuple[TapeKerne
     output_names = [port.name for port in kernel.outputs if port.name in outputs]
     tape = TapeKernel(differentiate(kernel, ["q", "u"], output_names, values=False, guards=False))
     live = LiveInputs(packed.system, structure.inputs)
-    return tape, lambda t, memory: live.now(numbers, t, memory)
+    return tape, lambda t, memory: live.numbers_in_run(numbers, t, memory)
 
 
 def _no_numbers(_t: float, _memory: Array) -> Array:

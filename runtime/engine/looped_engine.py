@@ -35,14 +35,14 @@ class LoopedEngine(EngineCalls):
         )  # fmt: skip
         if code:
             row = int(failed_row[0])
-            raise self.failed(failure, float(times[row]), q[row], u[row])
+            raise self.evaluation_error(failure, float(times[row]), q[row], u[row])
         if not np.isfinite(udot).all():
             row, column = (int(k[0]) for k in np.nonzero(~np.isfinite(udot)))
             name = self.packed.layout.u_name(column)
             raise self.not_finite(f"the acceleration of {name}", float(times[row]), q[row], u[row])
         return qdot, udot
 
-    def failed(self, failure: Any, t: float, q: Array, u: Array) -> NumericalFailure:
+    def evaluation_error(self, failure: Any, t: float, q: Array, u: Array) -> NumericalFailure:
         """Error for a state that cannot be evaluated; names the expression or the element."""
         cause = find_nonfinite_expression(self, t, q, u)
         if cause:
@@ -66,15 +66,15 @@ class LoopedEngine(EngineCalls):
             self.pointer(memory), self.pointer(udot), self.pointer(efforts), failure,
         )  # fmt: skip
         if code:
-            raise self.failed(failure, t, q, u)
+            raise self.evaluation_error(failure, t, q, u)
         if not np.isfinite(efforts).all():
             name = self.packed.layout.u_name(int(np.argmin(np.isfinite(efforts))))
             raise self.not_finite(f"the effort of {name}", t, q, u)
         return efforts
 
-    def required_by_inertia(self, q: Array, accelerations: Array) -> Array:
+    def mass_matrix_product(self, q: Array, accelerations: Array) -> Array:
         """Product of M(q) and n accelerations (n, nu), all speeds free; O(bodies) each."""
-        engine, zero_speeds = self.inertia_alone, np.zeros(self.nu)
+        engine, zero_speeds = self.inertia_only, np.zeros(self.nu)
         memory = engine.start_memory()
         base_efforts = engine.inverse_dynamics(0.0, q, zero_speeds, zero_speeds, memory)
         rows = [
@@ -89,7 +89,7 @@ class LoopedEngine(EngineCalls):
         Bodies are in the order of the topology; rotors count with the outboard body of their hinge,
         drives are ignored.
         """
-        engine, n, zero_speeds = self.inertia_alone, len(speeds), np.zeros(self.nu)
+        engine, n, zero_speeds = self.inertia_only, len(speeds), np.zeros(self.nu)
         energies = np.empty((n, self.packed.topology.count))
         failure = self.ffi.new("mstmm_failure *")
         contiguous_arrays = (np.ascontiguousarray(x, dtype=np.float64) for x in (q, speeds))
@@ -102,15 +102,15 @@ class LoopedEngine(EngineCalls):
             failure,
         )
         if code:
-            raise engine.failed(failure, 0.0, q, zero_speeds)
+            raise engine.evaluation_error(failure, 0.0, q, zero_speeds)
         return energies
 
     def mass_matrix(self, q: Array) -> Array:
         """Symmetric mass matrix (nu, nu) of one state; driven coordinates count as free."""
         if self.packed.layout.modal:
-            matrix = self.required_by_inertia(q, np.eye(self.nu)).T
+            matrix = self.mass_matrix_product(q, np.eye(self.nu)).T
             return np.asarray((matrix + matrix.T) / 2)
-        engine, failure = self.inertia_alone, self.ffi.new("mstmm_failure *")
+        engine, failure = self.inertia_only, self.ffi.new("mstmm_failure *")
         mass_matrix_values, work = np.empty((self.nu, self.nu)), np.empty(2 * self.nu)
         code = self.lib.mstmm_mass_matrix(
             engine.packed.model,
@@ -122,7 +122,7 @@ class LoopedEngine(EngineCalls):
             failure,
         )
         if code:
-            raise self.failed(failure, 0.0, q, np.zeros(self.nu))
+            raise self.evaluation_error(failure, 0.0, q, np.zeros(self.nu))
         return mass_matrix_values
 
     def solve(self, q: Array, columns: Array, memory: Array | None = None) -> Array:
@@ -133,9 +133,9 @@ class LoopedEngine(EngineCalls):
         each column requires a sweep at rest with its efforts.  Without `memory` no hinge is
         released.
         """
-        engine = self.inertia_alone
+        engine = self.inertia_only
         memory = engine.start_memory() if memory is None else memory
-        if self.packed.qr or self.packed.refined or self.packed.system.closes:
+        if self.packed.qr or self.packed.refined or self.packed.system.has_loops:
             # Time-dependent couplings cause motion without efforts: subtract it by a zero column.
             columns = np.vstack([columns, np.zeros(self.nu)])
             n, zero_speeds = len(columns), np.zeros(columns.shape)
@@ -149,7 +149,7 @@ class LoopedEngine(EngineCalls):
             self.pointer(memory), self.pointer(columns), self.pointer(solutions), failure,
         )  # fmt: skip
         if code:
-            raise engine.failed(failure, 0.0, q, np.zeros(self.nu))
+            raise engine.evaluation_error(failure, 0.0, q, np.zeros(self.nu))
         if not np.isfinite(solutions).all():
             name = self.packed.layout.u_name(int(np.nonzero(~np.isfinite(solutions))[1][0]))
             raise engine.not_finite(f"the solution for {name}", 0.0, q, np.zeros(self.nu))

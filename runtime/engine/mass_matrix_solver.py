@@ -29,9 +29,9 @@ class MassMatrixSolver:
     def __init__(self, engine: LoopedEngine, fusion: FusedCode) -> None:
         self._engine, self._fusion = engine, fusion
         self._lock = threading.Lock()
-        self._saved = 0.0
+        self._saved_seconds = 0.0
         self._library: DerivativeLibrary | None = None
-        self._looked = False
+        self._has_searched = False
         self._obstacle = ""
 
     def solve(self, q: Array, columns: Array) -> Array:
@@ -43,7 +43,7 @@ class MassMatrixSolver:
             return columns.copy()
         library = self._expect(len(q), columns.size)
         if library is not None:
-            solutions = self._fused(library, q, columns)
+            solutions = self._solve_compiled(library, q, columns)
             if solutions is not None:
                 return solutions
         rows = [
@@ -58,26 +58,31 @@ class MassMatrixSolver:
             self._library = self._fusion.solution(build=True)
 
     @property
-    def compiled(self) -> bool:
+    def uses_compiled_code(self) -> bool:
         """True if compiled code of the scene is in use."""
         return self._library is not None
 
     def _expect(self, states: int, numbers: int) -> DerivativeLibrary | None:
         """Compiled code if it exists or the saved time exceeds that of its compilation."""
         with self._lock:
-            self._saved += states * _SAVED_PER_STATE + numbers * _SAVED_PER_NUMBER
+            self._saved_seconds += states * _SAVED_PER_STATE + numbers * _SAVED_PER_NUMBER
             is_worthwhile = (
-                self._saved > _COMPILE_SECONDS + _COMPILE_SECONDS_PER_PAIR * self._engine.nu**2
+                self._saved_seconds
+                > _COMPILE_SECONDS + _COMPILE_SECONDS_PER_PAIR * self._engine.nu**2
             )
-            if self._library is None and not self._obstacle and (is_worthwhile or not self._looked):
-                self._looked = True
+            if (
+                self._library is None
+                and not self._obstacle
+                and (is_worthwhile or not self._has_searched)
+            ):
+                self._has_searched = True
                 try:
                     self._library = self._fusion.solution(build=is_worthwhile)
                 except EnvironmentFailure as error:
                     self._obstacle = str(error)
             return self._library
 
-    def _fused(self, library: DerivativeLibrary, q: Array, columns: Array) -> Array | None:
+    def _solve_compiled(self, library: DerivativeLibrary, q: Array, columns: Array) -> Array | None:
         """Solutions by compiled code; None if a guard fails (the looped engine names the cause)."""
         numbers, nu = self._fusion.numbers, self._engine.nu
         zero_speeds = np.zeros((1, nu))

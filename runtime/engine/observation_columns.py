@@ -49,7 +49,7 @@ SUMS: dict[str, tuple[str, str, slice]] = {
     "energy.kinetic": ("J", "kinetic energy", slice(0, 1)),
     "energy.gravity": ("J", "potential energy of gravity", slice(1, 2)),
     "energy.springs": ("J", "energy of springs and of deformed bodies", slice(2, 3)),
-    "power": ("W", "power of everything that is not stored", slice(3, 4)),
+    "power": ("W", "power of all non-conservative efforts", slice(3, 4)),
     "momentum": ("kg*m/s", "linear momentum", slice(4, 7)),
     "angular_momentum": ("kg*m2/s", "angular momentum about the inertial origin", slice(7, 10)),
 }

@@ -32,9 +32,9 @@ class OffTreeCoupling:
 
     The unknowns are 6 for each of `bodies`, then `efforts` (index in the workspace, speed) and
     `rows` (frame, direction, speed, row).  For each group: `members`, `readers` (unknowns that
-    depend on the group), and `moved` (speeds).  `passes` are the unknowns solved together.  `ranks`
-    (count,) are the positions of the unknowns in the matrix, which has `below` and `above`
-    diagonals below and above the main one.
+    depend on the group), and `moved_speeds` (speeds).  `passes` are the unknowns solved together.
+    `ranks` (count,) are the positions of the unknowns in the matrix, which has `lower_bandwidth`
+    and `upper_bandwidth` diagonals below and above the main one.
     """
 
     bodies: Sequence[int]
@@ -42,11 +42,11 @@ class OffTreeCoupling:
     rows: Sequence[tuple[int, int, int, int]]
     members: Sequence[Sequence[int]]
     readers: Sequence[Sequence[int]]
-    moved: Sequence[Sequence[int]]
+    moved_speeds: Sequence[Sequence[int]]
     passes: Sequence[Sequence[int]]
     ranks: Integers
-    below: int
-    above: int
+    lower_bandwidth: int
+    upper_bandwidth: int
 
     @property
     def count(self) -> int:
@@ -56,7 +56,7 @@ class OffTreeCoupling:
     @property
     def width(self) -> int:
         """Row length of the factored band matrix, including fill-in by row exchanges."""
-        return min(self.count, 2 * self.below + self.above + 1)
+        return min(self.count, 2 * self.lower_bandwidth + self.upper_bandwidth + 1)
 
     def written(self, engine: LoopedEngine) -> list[Any]:
         """C record of the unknowns, followed by the memory to which it points."""
@@ -73,14 +73,18 @@ class OffTreeCoupling:
         ]
         arrays: dict[str, tuple[str, Sequence[Any]]] = {
             "bodies": ("int[]", self.bodies),
-            "efforts": ("int64_t[]", [place for place, _ in self.efforts]),
+            "efforts": ("int64_t[]", [tree_index for tree_index, _ in self.efforts]),
             "speeds": ("int[]", [speed for _, speed in self.efforts]),
             "rows": ("mstmm_coupled_row[]", self.rows),
             "group": ("int[]", groups.tolist()), "rank": ("int[]", self.ranks.tolist()),
-            "unit": ("int64_t[]", [place for group_list in pass_units for place in group_list]),
+            "unit": ("int64_t[]", [index for group_list in pass_units for index in group_list]),
             "first_unit": ("int[]", _list_starts(pass_units)),
         }  # fmt: skip
-        for name, lists in (("reader", self.readers), ("moved", self.moved), ("seed", self.passes)):
+        for name, lists in (
+            ("reader", self.readers),
+            ("moved", self.moved_speeds),
+            ("seed", self.passes),
+        ):
             arrays[name] = "int[]", [entry for group_list in lists for entry in group_list]
             arrays[f"first_{name}"] = "int[]", _list_starts(lists)
         for name, (kind, numbers) in arrays.items():
@@ -89,7 +93,7 @@ class OffTreeCoupling:
             setattr(record, name, array)
         for name in ("bodies", "efforts", "rows", "passes"):
             setattr(record, f"n_{name}", len(getattr(self, name)))
-        record.below, record.above = self.below, self.above
+        record.below, record.above = self.lower_bandwidth, self.upper_bandwidth
         return kept_objects
 
 
@@ -100,10 +104,10 @@ def _list_starts(lists: Sequence[Sequence[int]]) -> list[int]:
 def off_tree_coupling(engine: LoopedEngine) -> OffTreeCoupling:
     """Find the unknowns outside the tree of a packed scene."""
     packed = engine.packed
-    reach, loops = packed.written.reach, packed.written.loops
+    reach, loops = packed.written.load_dependence, packed.written.loops
     efforts, rows = list(_effort_unknowns(engine)), _loop_unknowns(engine)
-    unknowns = list(reach.across), efforts, rows
-    if (loops and loops.couplings) or not (reach.across or efforts):
+    unknowns = list(reach.coupled_bodies), efforts, rows
+    if (loops and loops.couplings) or not (reach.coupled_bodies or efforts):
         return single_group(*unknowns, engine.nu)
     branches = _branch_of_bodies(packed.system)
     ends_by_frame = {
@@ -113,20 +117,22 @@ def off_tree_coupling(engine: LoopedEngine) -> OffTreeCoupling:
     group_of_place = dict(enumerate(branches)) | {frame: frame for frame in ends_by_frame}
     speeds = _speeds_by_group(packed.system, group_of_place)
     group_of_speed = {speed: name for name, own_speeds in speeds.items() for speed in own_speeds}
-    groups_of_body = {body: {group_of_place[watched_body] for watched_body in watched_bodies}
-            for body, watched_bodies in zip(reach.across, reach.watched, strict=True)}  # fmt: skip
+    groups_of_body = {
+        body: {group_of_place[watched_body] for watched_body in watched_bodies}
+        for body, watched_bodies in zip(reach.coupled_bodies, reach.load_sources, strict=True)
+    }
     groups_of_frame = dict[int, set[int]]()
     for frame, ends in ends_by_frame.items():
         moving_ends = [body for body in ends if body != GROUND]
         groups_of_frame[frame] = {frame} | {branches[body] for body in moving_ends}
         for body in moving_ends:
             groups_of_body[body].add(frame)
-    moved_groups = [branches[body] for body in reach.across for _ in range(6)]
+    moved_groups = [branches[body] for body in reach.coupled_bodies for _ in range(6)]
     moved_groups += [group_of_speed[speed] for _, speed in efforts]
     moved_groups += [frame for frame, _, _, _ in rows]
-    dependencies = [groups_of_body[body] for body in reach.across for _ in range(6)]
+    dependencies = [groups_of_body[body] for body in reach.coupled_bodies for _ in range(6)]
     dependencies += [
-        {group_of_place[body] for body in heard_bodies} for heard_bodies in reach.heard
+        {group_of_place[body] for body in heard_bodies} for heard_bodies in reach.effort_sources
     ]
     dependencies += [groups_of_frame[frame] for frame, _, _, _ in rows]
     return _independent_groups(
@@ -206,7 +212,9 @@ def _breadth_first(start: int, near: Mapping[int, set[int]]) -> list[int]:
     """Groups connected with `start` in breadth-first order, fewest neighbours first."""
     ordered, visited = [start], {start}
     for name in ordered:
-        ordered += sorted(near[name] - visited, key=lambda other: (len(near[other]), other))
+        ordered += sorted(
+            near[name] - visited, key=lambda neighbour: (len(near[neighbour]), neighbour)
+        )
         visited |= near[name]
     return ordered
 
@@ -236,24 +244,30 @@ def _find_passes(
 def _branch_of_bodies(system: System) -> list[int]:
     """First movable body on the path from the ground to each body, or `GROUND`."""
     branches = list[int]()
-    is_immobile = system.rows(lambda one: not one.nu and one.modal is None and one.section is None)
-    for place, parent in enumerate(system.parents.tolist()):
+    is_immobile = system.rows(
+        lambda body: not body.nu and body.modal is None and body.section is None
+    )
+    for tree_index, parent in enumerate(system.parents.tolist()):
         is_parent_fixed = parent == GROUND or branches[parent] == GROUND
         branches.append(
-            branches[parent] if not is_parent_fixed else GROUND if is_immobile[place] else place
+            branches[parent]
+            if not is_parent_fixed
+            else GROUND
+            if is_immobile[tree_index]
+            else tree_index
         )
     return branches
 
 
 def _speeds_by_group(system: System, group: Mapping[int, int]) -> dict[int, list[int]]:
     """Speeds by group; every body belongs to one group."""
-    speeds_found, first = dict[int, list[int]](), system.places["u"].tolist()
-    speed_counts = system.rows(lambda one: one.nu).tolist()
-    is_flexible = system.rows(lambda one: one.modal is not None)
-    for place, name in group.items():
+    speeds_found, first = dict[int, list[int]](), system.first_indices["u"].tolist()
+    speed_counts = system.rows(lambda body: body.nu).tolist()
+    is_flexible = system.rows(lambda body: body.modal is not None)
+    for tree_index, name in group.items():
         own_speeds = speeds_found.setdefault(name, [])
-        own_speeds += range(first[place], first[place] + speed_counts[place])
-        if is_flexible[place] and (modal := system.body(place).modal):
+        own_speeds += range(first[tree_index], first[tree_index] + speed_counts[tree_index])
+        if is_flexible[tree_index] and (modal := system.body(tree_index).modal):
             own_speeds += range(modal.u, modal.u + modal.n)
     return speeds_found
 
@@ -265,18 +279,20 @@ def _effort_unknowns(engine: LoopedEngine) -> Iterator[tuple[int, int]]:
     """
     packed, lib, model = engine.packed, engine.lib, engine.packed.model
     values = packed.scratch + engine.nq + engine.nu
-    for value, speed in packed.written.reach.efforts:
+    for value, speed in packed.written.load_dependence.efforts:
         yield values + value, speed
-    first, loops = packed.system.places["u"], packed.written.loops
+    first, loops = packed.system.first_indices["u"], packed.written.loops
     frames = {coupling.frame for coupling in packed.system.closures}
     coupled_places = (
-        {place for coupling in loops.couplings for place in coupling.columns} if loops else set()
+        {tree_index for coupling in loops.couplings for tree_index in coupling.columns}
+        if loops
+        else set()
     )
-    for place in sorted(coupled_places - frames):
-        body = model.bodies[place]
+    for tree_index in sorted(coupled_places - frames):
+        body = model.bodies[tree_index]
         first_effort = body.block + lib.MSTMM_BLOCK_FIXED + lib.MSTMM_SPEED_TAU * body.nu
         for k in range(body.nu):
-            yield int(first_effort) + k, int(first[place]) + k
+            yield int(first_effort) + k, int(first[tree_index]) + k
 
 
 def _loop_unknowns(engine: LoopedEngine) -> list[tuple[int, int, int, int]]:
@@ -289,7 +305,7 @@ def _loop_unknowns(engine: LoopedEngine) -> list[tuple[int, int, int, int]]:
     unknowns = list[tuple[int, int, int, int]]()
     if loops is None:
         return unknowns
-    first = packed.system.places["u"]
+    first = packed.system.first_indices["u"]
     for closure in loops.closures:
         speeds = range(packed.system.body(closure.frame).nu)
         unknowns += [(closure.frame, k, int(first[closure.frame]) + k, -1) for k in speeds]

@@ -56,7 +56,7 @@ class TangentKernels:
                 self._library = self._get(build=True)
 
     @property
-    def compiled(self) -> bool:
+    def uses_compiled_code(self) -> bool:
         """True if compiled code is in use."""
         return self._library is not None
 
@@ -72,9 +72,9 @@ class TangentKernels:
             inputs = [states[name] for name in INPUTS]
             return self._library.run(self._pairs.index((port, output)), inputs, directions)
         with self._lock:
-            return self._interpreted(port, output, states, directions)
+            return self._evaluate_interpreted(port, output, states, directions)
 
-    def _interpreted(
+    def _evaluate_interpreted(
         self, port: str, output: str, states: Mapping[str, Array], directions: Array
     ) -> Array:
         length = self.structure.nq if output == "qdot" else self.structure.nu
@@ -97,7 +97,7 @@ class TangentKernels:
 
     @cached_property
     def _accelerations(self) -> KernelIR:
-        kernel: KernelIR = self._fusion.fused(self.structure).kernels["accelerations"]
+        kernel: KernelIR = self._fusion.structure_ir(self.structure).kernels["accelerations"]
         return kernel
 
     def _kernel(self, port: str, output: str) -> KernelIR:

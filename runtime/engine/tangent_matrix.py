@@ -41,13 +41,14 @@ class TangentMatrix:
         self.numbers = np.zeros(max(1, _lay_out_tangent(engine)))
         self.work = np.zeros(engine.lib.mstmm_tangent_work(model, slopes.slots))
         across = off_tree_coupling(engine)
-        self.couplings, self.coupled = across.written(engine), across.count
-        self.answers = np.zeros(max(1, len(across.passes) * self.nu))
-        self.closure = np.zeros(self.coupled * (across.width + 4) + 1)
+        self.couplings, self.off_tree_count = across.written(engine), across.count
+        self.solutions = np.zeros(max(1, len(across.passes) * self.nu))
+        self.closure = np.zeros(self.off_tree_count * (across.width + 4) + 1)
         self.record = record = ffi.new("mstmm_tangent *")
         record.model, record.slots = model, slopes.slots
-        record.couplings, record.n_coupled = self.couplings[0], self.coupled
-        for name in ("workspace", "memory", "work", "numbers", "answers", "closure"):
+        record.couplings, record.n_coupled = self.couplings[0], self.off_tree_count
+        record.answers = engine.pointer(self.solutions)
+        for name in ("workspace", "memory", "work", "numbers", "closure"):
             setattr(record, name, engine.pointer(getattr(self, name)))
 
     def residual(self, t: float, q: Array, u: Array, a: Array | None = None) -> Array:
@@ -91,7 +92,7 @@ class TangentMatrix:
         if engine.lib.mstmm_linear_swept(
             self.record, t, *state_pointers, n, speed_indices, *result_pointers
         ):
-            raise engine.failed(self.record.failure, t, *self.state)
+            raise engine.evaluation_error(self.record.failure, t, *self.state)
         return matrices_found
 
     def factor(self, s: float, sq: float, kappa: float = 1.0, rate: float = 1.0) -> None:
@@ -145,7 +146,7 @@ class TangentMatrix:
         bodies, because pivots do not contain these loads.  Factorisations with negative pivots fail
         unless `allow_negative` was called before.
         """
-        if self.coupled:
+        if self.off_tree_count:
             return None
         sizes, pivots = self.pivots()
         return int(count_negative(pivots[None], sizes)[0])
@@ -194,7 +195,7 @@ class TangentMatrix:
         ]
         if getattr(self.engine.lib, f"mstmm_{name}")(self.record, *c_arguments):
             t = float(self.record.t)
-            raise self.engine.failed(self.record.failure, t, *self.state)
+            raise self.engine.evaluation_error(self.record.failure, t, *self.state)
 
 
 def thread_tangent(engine: LoopedEngine) -> TangentMatrix:
@@ -227,10 +228,10 @@ def _lay_out_tangent(engine: LoopedEngine) -> int:
     packed = engine.packed
     count = int(engine.lib.mstmm_tangent_lay(packed.model))
     if count < 0:
-        place = -1 - count
-        force = place - packed.system.count
+        failed_index = -1 - count
+        force = failed_index - packed.system.count
         if force < 0:
-            culprit = f'"{engine.hinge_name(place)}" or its body'
+            culprit = f'"{engine.hinge_name(failed_index)}" or its body'
         else:
             culprit = f'"{packed.scene.forces[force].name}"'
         raise SceneError(

@@ -63,13 +63,13 @@ def _fixed_unknowns(
 ) -> Iterator[list[int]]:
     """Fixed unknowns: by the inboard hinge alone, then also by what the other ends carry."""
     bends = direction in ("y", "z")
-    turns_freely = direction in conditions.turns
+    turns_freely = direction in conditions.free_rotations
     held_node = nearest_node(nodes, conditions.x)
     if bends:
-        by_hinge = [] if conditions.moves else [2 * held_node]
+        by_hinge = [] if conditions.has_free_translation else [2 * held_node]
         by_hinge += [] if turns_freely else [2 * held_node + 1]
     else:
-        free = turns_freely if direction == "twist" else conditions.moves
+        free = turns_freely if direction == "twist" else conditions.has_free_translation
         by_hinge = [] if free else [held_node]
     yield by_hinge
     by_loads = list(by_hinge)
@@ -77,9 +77,9 @@ def _fixed_unknowns(
         node = nearest_node(nodes, end.x)
         carries_moment = direction in end.moments
         if bends:
-            by_loads += [2 * node] if end.heavy else []
-            by_loads += [2 * node + 1] if carries_moment and end.heavy else []
-        elif end.heavy:
+            by_loads += [2 * node] if end.is_heavy else []
+            by_loads += [2 * node + 1] if carries_moment and end.is_heavy else []
+        elif end.is_heavy:
             by_loads.append(node)
     if set(by_loads) != set(by_hinge):
         yield sorted(set(by_loads))

@@ -37,7 +37,7 @@ SLOPE, MARGIN = 0.3, 1.25
 #: Random deflections, besides the shapes and the static deflections under loads on the ends.
 _RANDOM_COUNT = 48
 #: Amplitude of shapes that rotate no section, as a share of their modal scale.
-_UNTURNED_SHARE = 0.1
+_UNROTATED_FRACTION = 0.1
 #: Share of the largest inertia that counts as none, as of a straight beam about its own axis.
 _NO_INERTIA = 1e-13
 
@@ -50,7 +50,7 @@ def is_mass_definite(body: ModalBody, held: ModalPort, support: Support, rotatio
     """
     if not np.any(body.G) and not np.any(body.X):
         return True  # M is the exact integral of a square
-    if not held.moves and not support.speeds:
+    if not held.can_move and not support.speeds:
         return True  # only the constant modal mass matrix remains
     return is_definite_at(body, held, support, _test_deflections(body, rotations))
 
@@ -106,7 +106,7 @@ def _all_definite(matrices: Array) -> bool:
 def _test_deflections(body: ModalBody, rotations: Array) -> Array:
     """Deflections (N, n) whose largest rotation of a section is SLOPE * MARGIN."""
     unturned = ~rotations.any(axis=(0, 1))
-    scales = modal_sizes(body) * np.where(unturned, _UNTURNED_SHARE, 1.0)
+    scales = modal_sizes(body) * np.where(unturned, _UNROTATED_FRACTION, 1.0)
     drawn = np.random.default_rng(0).normal(size=(_RANDOM_COUNT, body.n))
     root_energies = np.sqrt(np.diag(body.K)) * scales
     loads = [body.C, *(np.concatenate([p.phi, p.theta]) for p in body.ports.values())]
@@ -126,7 +126,7 @@ class _MassMatrices:
     """Mass matrices of a body and its support at deflections eta (N, n)."""
 
     def __init__(self, body: ModalBody, held: ModalPort, eta: Array) -> None:
-        n, zero, self.held, self.Mff = body.n, np.zeros(3), held, body.Mff
+        n, zero, self.held_port, self.Mff = body.n, np.zeros(3), held, body.Mff
         inputs = {**moment_inputs(body), "eta": eta, "etad": np.zeros(n), "v": zero, "w": zero}
         outputs = evaluate(kernel("momentum"), inputs, n)
         self.S, self.S_rf = np.empty((len(eta), 6, 6)), outputs["S_rf"]
@@ -135,7 +135,7 @@ class _MassMatrices:
         back = held.rotation.T
         self.frame_by_end = _twist_transform(back, -back @ held.position)
         self.frame_by_modes = np.zeros((len(eta), 6, n))
-        if held.moves:
+        if held.can_move:
             self.frame_by_end, self.frame_by_modes = _frame_twist(held, eta)
 
     def matrices(self, support: Support) -> Iterator[Array]:

@@ -24,7 +24,7 @@ class ModalPort:
     second_order: Array  #: (6, n, n) symmetric in the last two; zeros where linear
 
     @property
-    def moves(self) -> bool:
+    def can_move(self) -> bool:
         """Whether the section can move relative to the floating frame."""
         return bool(np.any(self.phi) or np.any(self.theta) or np.any(self.second_order))
 

@@ -19,7 +19,7 @@ def modal_sizes(body: ModalBody) -> Array:
     displacement = np.sqrt(np.abs(np.diag(body.Mff)) / max(float(body.mass), 1e-300))
     rotation = np.max([np.abs(port.theta).max(axis=0) for port in body.ports.values()], axis=0)
     if body.shapes is not None:
-        sections = body.shapes.at(np.linspace(0.0, body.shapes.length, 2 * body.n + 3)).theta
+        sections = body.shapes.values_at(np.linspace(0.0, body.shapes.length, 2 * body.n + 3)).theta
         rotation = np.maximum(rotation, np.abs(sections).max(axis=(0, 1)))
     return np.asarray(1.0 / np.maximum(np.maximum(displacement / radius, rotation), 1e-300))
 

@@ -51,7 +51,7 @@ class Supports:
         self._bodies = {body.name: body for body in scene.body if body.type == "rigid"}
         self._released = {event.hinge for event in scene.event if event.hinge}
 
-    def of(self, name: str) -> Support:
+    def support_of(self, name: str) -> Support:
         """Support of a flexible body: its inboard hinge and rigid bodies.
 
         They are followed up to the ground or to another flexible body.
@@ -86,14 +86,14 @@ class Supports:
 
     def _free_motions(self, hinge: Hinge) -> Array | None:
         """Free motions (6, m) of a hinge, outboard axes; None if they are not known."""
-        if hinge.lets_go or hinge.name in self._released:
+        if hinge.is_released or hinge.name in self._released:
             return None
         if _is_prescribed(hinge):
             return np.zeros((6, 0))
         facts, motions = hinge.facts, initial_motion_axes(hinge)
         if facts is None or motions is None or not facts.in_place:
             return None
-        if facts.slides and (facts.turns or not facts.steady):
+        if facts.slides and (facts.turns or not facts.constant_subspace):
             return None
         if facts.slides:
             directions = np.array([translation for translation, _ in motions]).T

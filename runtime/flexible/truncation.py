@@ -18,15 +18,15 @@ class Truncation:
     axes, all balanced by rigid accelerations of the body.
 
     Attributes:
-        whole, kept: (6 p, m) displacement and rotation of the ports per unit load, of the full
-            model and of the shapes, relative to the mean motion of the mass.
+        full_response, shape_response: (6 p, m) displacement and rotation of the ports per unit
+            load, of the full model and of the shapes, relative to the mean motion of the mass.
     """
 
     ports: tuple[str, ...]
-    whole: Array
-    kept: Array
+    full_response: Array
+    shape_response: Array
 
-    def missed(self, loads: Array, length: float) -> Array:
+    def missed_share(self, loads: Array, length: float) -> Array:
         """Share (n,) of the port deflection under `loads` (n, m) that the shapes do not represent.
 
         A radian counts as `length` (m); 0 without deflection.
@@ -34,7 +34,7 @@ class Truncation:
         sizes = np.tile(np.repeat([1.0, length], 3), len(self.ports))
         whole, missing = (
             np.linalg.norm(loads @ (deflection * sizes[:, None]).T, axis=1)
-            for deflection in (self.whole, self.whole - self.kept)
+            for deflection in (self.full_response, self.full_response - self.shape_response)
         )
         return np.divide(
             missing, whole, out=np.zeros_like(whole), where=(whole > 0) & np.isfinite(whole)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
+from mstmm.plain_data import from_plain, stored_as, to_plain
 from mstmm.risk import Risk
 
 
@@ -16,8 +17,8 @@ class ErrorControlRun:
     Attributes:
         method: as in `simulate`.
         rtol, atol: its tolerances.
-        apart: distance from the last run, which is about its error; None for the last run, and for
-            a run that did not reach the end.
+        distance: distance from the last run, which is about its error; None for the last run, and
+            for a run that did not reach the end.
         evaluations: calls of the right-hand side, and of the residual by implicit methods.
         cpu_s: processor time, s.
         failure: reason that its result cannot be used, or "".
@@ -26,7 +27,7 @@ class ErrorControlRun:
     method: str
     rtol: float
     atol: float
-    apart: float | None
+    distance: float | None = field(metadata=stored_as("apart"))
     evaluations: int
     cpu_s: float
     failure: str = ""
@@ -37,32 +38,32 @@ class AchievedError:
     """Achieved error of a run with a target error.
 
     Attributes:
-        asked: target error.
+        target: target error.
         estimate: largest expected error over the samples; None if unknown.
-        of, unit, scaling: quantities of the error, its unit ("1" if relative) and its scaling, as
-            in a chart.
+        quantity, unit, scaling: quantities of the error, its unit ("1" if relative) and its
+            scaling, as in a chart.
         method, rtol, atol: of the run whose result is used.
-        found: method of the estimate.
-        why: reason that the target was not met, or "".
+        how: method of the estimate.
+        reason: reason that the target was not met, or "".
         runs: all runs that were made, in order.
     """
 
-    asked: float
+    target: float = field(metadata=stored_as("asked"))
     estimate: float | None
-    of: str
+    quantity: str = field(metadata=stored_as("of"))
     unit: str
     scaling: str
     method: str
     rtol: float
     atol: float
-    found: str
-    why: str
+    how: str = field(metadata=stored_as("found"))
+    reason: str = field(metadata=stored_as("why"))
     runs: tuple[ErrorControlRun, ...]
 
     @property
-    def met(self) -> bool:
+    def is_met(self) -> bool:
         """True if the estimate is at most the target error."""
-        return self.estimate is not None and self.estimate <= self.asked
+        return self.estimate is not None and self.estimate <= self.target
 
     @property
     def cpu_s(self) -> float:
@@ -72,16 +73,17 @@ class AchievedError:
     @property
     def risk(self) -> Risk | None:
         """Finding that the target error is not met, with the reason; None if it is met."""
-        if self.met:
+        if self.is_met:
             return None
         estimate_text = (
             "not known" if self.estimate is None else f"{_with_unit(self.estimate, self.unit)}"
         )
         return Risk(
-            "wanted-error", self.of,
-            f"the target error of {self.of}, {_with_unit(self.asked, self.unit)}, is not reached: "
-            f"the estimate is {estimate_text}, because {self.why}", self._remedy, self.estimate,
-            self.asked, self.unit,
+            "wanted-error", self.quantity,
+            f"the target error of {self.quantity}, {_with_unit(self.target, self.unit)}, is not "
+            f"reached: "
+            f"the estimate is {estimate_text}, because {self.reason}", self._remedy, self.estimate,
+            self.target, self.unit,
         )  # fmt: skip
 
     @property
@@ -98,15 +100,15 @@ class AchievedError:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data, for files."""
-        return asdict(self) | {"met": self.met, "cpu_s": self.cpu_s}
+        return to_plain(self) | {"met": self.is_met, "cpu_s": self.cpu_s}
 
     def __str__(self) -> str:
         if self.estimate is None:
-            return f"not known, {_with_unit(self.asked, self.unit)} requested"
+            return f"not known, {_with_unit(self.target, self.unit)} requested"
         return (
-            f"{_with_unit(self.estimate, self.unit)} of {self.of} "
-            f"({_with_unit(self.asked, self.unit)} "
-            f"requested): {self.found}"
+            f"{_with_unit(self.estimate, self.unit)} of {self.quantity} "
+            f"({_with_unit(self.target, self.unit)} "
+            f"requested): {self.how}"
         )
 
 
@@ -125,6 +127,6 @@ def from_dict(data: Mapping[str, Any] | None) -> AchievedError | None:
     numbers += [] if data["estimate"] is None else [data["estimate"]]
     if not all(isinstance(number, (int, float)) for number in numbers):
         raise TypeError("the record of an achieved error contains a value that is no number")
-    runs = tuple(ErrorControlRun(**run_data) for run_data in rows)
+    runs = tuple(from_plain(ErrorControlRun, run_data) for run_data in rows)
     attributes = {key: value for key, value in data.items() if key not in ("met", "cpu_s", "runs")}
-    return AchievedError(**attributes, runs=runs)
+    return from_plain(AchievedError, attributes | {"runs": runs})

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Any
 
@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from mstmm.array_validation import Array, Integers
 from mstmm.errors import SceneError
+from mstmm.plain_data import stored_as
 
 from .c_tableau import c_tableau
 from .settings import Settings
@@ -81,7 +82,7 @@ class Samples:
     event: Integers
 
     @staticmethod
-    def joined(parts: Sequence[Samples]) -> Samples:
+    def join(parts: Sequence[Samples]) -> Samples:
         """Join the rows of `parts` (at least one)."""
         return Samples(
             np.concatenate([p.t for p in parts]),
@@ -107,9 +108,10 @@ class Statistics:
     """Counts and error estimates of a run so far.
 
     Attributes:
-        steps, rejected, evaluations, events: counts; evaluations are calls of the right-hand side.
+        steps, rejected_steps, evaluations, events: counts; evaluations are calls of the right-hand
+            side.
         smallest_step, largest_step: of steps not shortened by a break, an event or the end (s).
-        sum_local_error: sum over all steps of the RMS local error estimate, in the units of y.
+        sum_of_local_errors: sum over all steps of the RMS local error estimate, in the units of y.
             The error of the result may be larger by any factor.
         sum_scaled_error: the same in units of the tolerance.  Both None without an estimate.
         stiffness_index: last estimate of h |lambda|; largest_stiffness_index its maximum.
@@ -117,30 +119,30 @@ class Statistics:
             stability permits: the system is stiff for an explicit method, or the fixed step is
             long.
         stability_limited_steps: number of these steps.
-        crossings: number of steps that ended where an expression of the state switches.
+        switch_crossings: number of steps that ended where an expression of the state switches.
         residuals, tangents, solves, iterations: evaluations of the system by implicit methods, and
             iterations of Newton's method.
-        laws_tangents: number of approximate tangents, from inertia and laws only.
+        approximate_tangents: number of approximate tangents, from inertia and laws only.
     """
 
     steps: int
-    rejected: int
+    rejected_steps: int = field(metadata=stored_as("rejected"))
     evaluations: int
     events: int
     smallest_step: float | None
     largest_step: float | None
-    sum_local_error: float | None
+    sum_of_local_errors: float | None = field(metadata=stored_as("sum_local_error"))
     sum_scaled_error: float | None
     stiffness_index: float
     largest_stiffness_index: float
     stability_limited: bool
     stability_limited_steps: int
-    crossings: int = 0
+    switch_crossings: int = field(default=0, metadata=stored_as("crossings"))
     residuals: int = 0
     tangents: int = 0
     solves: int = 0
     iterations: int = 0
-    laws_tangents: int = 0
+    approximate_tangents: int = field(default=0, metadata=stored_as("laws_tangents"))
 
 
 class Integrator:
@@ -187,16 +189,16 @@ class Integrator:
         self._outputs(run, settings.output_times)
         self.map_times(breaks, bounds, pole)
         self._buffer(run, capacity)
-        self.begin(tableau, settings, y0, atol)
+        self.start(tableau, settings, y0, atol)
 
-    def begin(
+    def start(
         self, tableau: Tableau, settings: Settings, y0: ArrayLike, atol: ArrayLike | None = None
     ) -> None:
         """Start the run, or start it again with another method or other tolerances.
 
         Times and output times remain those of the construction; samples not yet taken are lost.
         """
-        self._refuse_unsuited(tableau)
+        self._check_method(tableau)
         system, run = self._system, self._run
         if settings.tangent == "laws" and not system.implicit.laws:
             raise SceneError('tangent = "laws": this system has no approximate tangent by laws')
@@ -208,10 +210,10 @@ class Integrator:
         run.first_step, run.min_step = settings.first_step, settings.min_step
         run.max_step, run.max_steps = settings.max_step, settings.max_steps
         run.tangents = TANGENTS.index(settings.tangent)
-        self.call_back(0)
+        self.request_return(0)
         tolerances = np.full(system.n_error, settings.atol if atol is None else atol, np.float64)
         run.atol = self._atol = self._ffi.from_buffer("double[]", tolerances)
-        run.workspace = self._space = self._room(run.tableau)
+        run.workspace = self._space = self._make_workspace(run.tableau)
         self._samples: list[Samples] = []
         self.kept_bytes = 0  # of all samples so far
         y_start = np.array(y0, dtype=np.float64)
@@ -220,7 +222,7 @@ class Integrator:
         if self._lib.mstmm_run_start(run, self._doubles(y_start)) == Status.BAD_ARGUMENT:
             raise SceneError(f"{tableau.name}: check {_ARGUMENT_CHECKS[run.count.code]}")
 
-    def _refuse_unsuited(self, tableau: Tableau) -> None:
+    def _check_method(self, tableau: Tableau) -> None:
         implicit_system = self._system.implicit
         if tableau.implicit and not implicit_system:
             raise SceneError(
@@ -230,7 +232,7 @@ class Integrator:
         if implicit_system:
             check_size(tableau, implicit_system.n_q + implicit_system.n_u)
 
-    def _room(self, tableau: Any) -> Any:
+    def _make_workspace(self, tableau: Any) -> Any:
         """Workspace for a method; it exists as long as the returned object."""
         size = self._lib.mstmm_workspace_size(self._system, tableau)
         return self._ffi.from_buffer("double[]", np.empty(max(size, 1)))
@@ -303,7 +305,7 @@ class Integrator:
         self._lib.mstmm_run_map(self._run, *self._mapped)
         self.restore(other.state())
 
-    def call_back(self, signs: int, look: int = 0, short_step: float = 0.0) -> None:
+    def request_return(self, signs: int, look: int = 0, short_step: float = 0.0) -> None:
         """Make `advance` return between steps, with `asked` True.
 
         Args:
@@ -322,8 +324,8 @@ class Integrator:
         return int(self._run.count.steps)
 
     @property
-    def asked(self) -> bool:
-        """True if the last `advance` returned because of `call_back`."""
+    def callback_requested(self) -> bool:
+        """True if the last `advance` returned because of `request_return`."""
         return bool(self._run.count.asked)
 
     @property
@@ -341,15 +343,15 @@ class Integrator:
         """Length of the last step, s."""
         return float(self._run.real.h)
 
-    def change(self, tableau: Tableau) -> None:
+    def switch_method(self, tableau: Tableau) -> None:
         """Continue with another method from the current state, between steps or after `no_step`.
 
         Counts, samples, events and, except after a failure, the length of the next step are kept.
         Raises SceneError within a step, and for methods or runs with fixed steps.
         """
-        self._refuse_unsuited(tableau)
+        self._check_method(tableau)
         c_method = c_tableau(self._ffi, tableau)
-        workspace = self._room(c_method)
+        workspace = self._make_workspace(c_method)
         if self._lib.mstmm_run_change(self._run, c_method, workspace):
             raise SceneError(f'method "{tableau.name}" cannot continue this run')
         self.tableau, self._space = tableau, workspace
@@ -372,10 +374,10 @@ class Integrator:
                 np.zeros(0), np.zeros((0, n)), np.zeros((0, nm)), np.zeros(0, dtype=np.int64)
             )
         if len(self._samples) > 1:
-            self._samples = [Samples.joined(self._samples)]
+            self._samples = [Samples.join(self._samples)]
         return self._samples[0]
 
-    def take(self) -> Samples:
+    def take_samples(self) -> Samples:
         """Return all samples not yet taken and remove them here (for writing during the run)."""
         samples = self.samples
         self._samples = []
@@ -419,27 +421,27 @@ class Integrator:
         has_steps = counts.steps > 0 and reals.largest_step > 0.0
         return Statistics(
             steps=int(counts.steps),
-            rejected=int(counts.rejected),
+            rejected_steps=int(counts.rejected),
             evaluations=int(counts.evaluations),
             events=int(counts.events_fired),
             smallest_step=float(reals.smallest_step) if has_steps else None,
             largest_step=float(reals.largest_step) if has_steps else None,
-            sum_local_error=float(reals.sum_local_error) if adaptive else None,
+            sum_of_local_errors=float(reals.sum_local_error) if adaptive else None,
             sum_scaled_error=float(reals.sum_scaled_error) if adaptive else None,
             stiffness_index=float(reals.stiffness),
             largest_stiffness_index=float(reals.largest_stiffness),
             stability_limited=bool(counts.stability_limited),
             stability_limited_steps=int(counts.stability_limited_steps),
-            crossings=int(counts.crossings),
+            switch_crossings=int(counts.crossings),
             residuals=int(counts.residuals),
             tangents=int(counts.tangents),
             solves=int(counts.solves),
             iterations=int(counts.iterations),
-            laws_tangents=int(counts.laws_tangents),
+            approximate_tangents=int(counts.laws_tangents),
         )
 
     @property
-    def unseen(self) -> tuple[int, float] | None:
+    def missed_condition(self) -> tuple[int, float] | None:
         """First event or switch that may have been missed: (index, time in s), or None.
 
         Indices of switches follow those of the events.
@@ -459,7 +461,7 @@ class Integrator:
             else None
         )
 
-    def fits(self, samples: Samples) -> bool:
+    def accepts(self, samples: Samples) -> bool:
         """True if the rows of `samples` have the sizes of this run."""
         return samples.y.shape[1:] == (self._system.n_state,) and samples.memory.shape[1:] == (
             self._system.n_memory,

@@ -43,10 +43,10 @@ def c_tableau(ffi: Any, tableau: Tableau) -> Any:
     record.c, record.c_extra = doubles(tableau.C), doubles(tableau.C_extra)
     record.stability_limit = tableau.real_stability_limit
     record.n_nodes, record.n_iterations = tableau.iterated or (0, 0)
-    record.mix, record.is_read = doubles(tableau.mix), integers(tableau.read_blocks)
+    record.mix, record.is_read = doubles(tableau.block_weights), integers(tableau.shared_blocks)
     if isinstance(tableau, Implicit):
         record.kind, record.gamma = tableau.kind, tableau.gamma
-        record.n_inner, record.inner = len(tableau.inner), doubles(tableau.inner)
+        record.n_inner, record.inner = len(tableau.inner_nodes), doubles(tableau.inner_nodes)
         record.quadrature, record.roughness = (
             doubles(tableau.quadrature),
             doubles(tableau.roughness),

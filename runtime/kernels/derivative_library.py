@@ -63,7 +63,7 @@ class DerivativeLibrary:
     """Tangent kernels of one library, by index.  Safe to call from several threads."""
 
     def __init__(self, loaded: ctypes.CDLL, found: _CLibrary) -> None:
-        self._loaded = loaded
+        self._library = loaded
         self._kernels = [found.kernels[k] for k in range(found.n_kernels)]
 
     def run(self, kernel: int, inputs: Sequence[Array], directions: Array) -> Array:

@@ -78,7 +78,7 @@ class FusedLibrary:
     """
 
     def __init__(self, descriptor: Any, loaded: ctypes.CDLL) -> None:
-        self.descriptor, self._loaded = descriptor, loaded
+        self.descriptor, self._library = descriptor, loaded
         self.ffi, _ = prebuilt_kernels.module()
         self.nq, self.nu = int(descriptor.nq), int(descriptor.nu)
         self.np, self.n_memory = int(descriptor.np), int(descriptor.n_memory)
@@ -102,7 +102,7 @@ class FusedLibrary:
         call.memory[: self.n_memory], call.efforts[:] = memory[: self.n_memory], efforts
         return call(), call.qdot, call.udot
 
-    def many(
+    def accelerations_batch(
         self,
         p: Array,
         t: Array,

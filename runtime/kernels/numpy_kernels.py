@@ -51,7 +51,7 @@ class _ArrayEvaluation(Interpreter):
 
     def __init__(self, kernel: KernelIR, inputs: Mapping[str, ArrayLike], n: int) -> None:
         super().__init__(kernel, _OPERATIONS, n)
-        input_arrays = {port.name: self._given(port, inputs) for port in kernel.inputs}
+        input_arrays = {port.name: self._input_values(port, inputs) for port in kernel.inputs}
         lead_shapes = [
             a.shape[: a.ndim - len(self.ports[name].shape)] for name, a in input_arrays.items()
         ]
@@ -65,7 +65,7 @@ class _ArrayEvaluation(Interpreter):
     def _shape(self, port: Port) -> tuple[int, ...]:
         return tuple(self.n if isinstance(extent, str) else extent for extent in port.shape)
 
-    def _given(self, port: Port, inputs: Mapping[str, ArrayLike]) -> Array:
+    def _input_values(self, port: Port, inputs: Mapping[str, ArrayLike]) -> Array:
         if port.name not in inputs:
             raise ValueError(f"{self.kernel.name}: no value for the input {port.name!r}")
         array, shape = np.asarray(inputs[port.name], dtype=float), self._shape(port)
@@ -133,11 +133,11 @@ class _ArrayEvaluation(Interpreter):
 
     def solve(self, solve: Solve) -> None:
         if solve.symmetric:
-            self._by_diagonal(solve)
+            self._solve_by_ldl(solve)
         else:
-            self._by_rows(solve)
+            self._solve_by_lu(solve)
 
-    def _by_rows(self, solve: Solve) -> None:
+    def _solve_by_lu(self, solve: Solve) -> None:
         """Solve by LU with row exchange, per point in LAPACK; fails only for a zero pivot."""
         a, b = self.arrays[solve.matrix], self.arrays[solve.right]
         is_vector = len(self.ports[solve.port].shape) == 1
@@ -147,7 +147,7 @@ class _ArrayEvaluation(Interpreter):
             raise NumericalFailure(f"{self.kernel.name}: {solve.message}") from None
         self.results[solve.port][...] = solution[..., 0] if is_vector else solution
 
-    def _by_diagonal(self, solve: Solve) -> None:
+    def _solve_by_ldl(self, solve: Solve) -> None:
         """Solve by L D L^T without pivoting from the lower triangle, for all points at once."""
         a = self.arrays[solve.matrix]
         a = np.tril(a) + np.swapaxes(np.tril(a, -1), -1, -2)

@@ -37,9 +37,9 @@ class TapeKernel:
 
     def __init__(self, kernel: KernelIR) -> None:
         self._ffi, self._lib = prebuilt_kernels.module()
-        self._kept: list[object] = []
+        self._references: list[object] = []
         tape = compile_tape(kernel)
-        self._tape = c_tape(self._ffi, tape, self._kept)
+        self._tape = c_tape(self._ffi, tape, self._references)
         self._work = self._reals(tape.slots)
         self._inputs = {p.name: self._reals(p.length()) for p in kernel.inputs}
         self._outputs = {p.name: self._reals(p.length()) for p in kernel.outputs}

@@ -116,7 +116,7 @@ def write(folder: Path, library: str, about: Mapping[str, Any]) -> Entry:
     return Entry(folder, full_description)
 
 
-def keep_text(folder: Path, sources: Mapping[str, str]) -> None:
+def store_text(folder: Path, sources: Mapping[str, str]) -> None:
     """Write the C text, compressed, into `folder`.  Raises OSError."""
     import gzip
 

@@ -185,7 +185,7 @@ def _build_entry(folder: Path, order: BuildOrder, compiler: Compiler, timeout: f
             f"the library that the C compiler {compiler.command[0]} built from {sources[0].name} "
             f"cannot be used: {problem_text}; {remedy}"
         )
-    entries.keep_text(folder, texts)
+    entries.store_text(folder, texts)
     description = {
         **order.about, "name": order.name, "key": order.key, "flags": list(compilation.flags),
         "seconds": round(compilation.seconds, 4), "compiler": compiler.identity(),

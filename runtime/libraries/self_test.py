@@ -46,5 +46,5 @@ def problem(library: Path, symbols: Sequence[str]) -> str:
         return ""
     if result.code < 0:
         return f"it crashes ({result.signal()})"
-    lines = result.said.splitlines()
+    lines = result.output.splitlines()
     return lines[-1].strip()[:300] if lines else f"its test ended with code {result.code}"

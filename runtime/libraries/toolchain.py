@@ -125,7 +125,7 @@ def compiler_version(found: Compiler, folder: Path) -> str:
         result = run([*found.command, "--version"], folder, 10.0)
     except (ProcessTimeout, OSError):
         return "unknown"
-    lines = result.said.splitlines()
+    lines = result.output.splitlines()
     return lines[0].strip() if result.code == 0 and lines else "unknown"
 
 
@@ -173,7 +173,7 @@ def build(
 
 def _unsupported_flags(ended: ProcessResult, optional: Sequence[str]) -> set[str]:
     """Optional flags that a failed compiler names in a message about unknown options."""
-    complaints = [line for line in ended.said.splitlines() if _UNKNOWN_OPTION.search(line)]
+    complaints = [line for line in ended.output.splitlines() if _UNKNOWN_OPTION.search(line)]
     mentioned_words = {word.strip("'\"`‘’;,") for line in complaints for word in line.split()}
     return mentioned_words & set(optional) if ended.code != 0 else set()
 
@@ -202,7 +202,7 @@ def _run_compiler(
 def _failure_text(found: Compiler, ended: ProcessResult, source: str) -> str:
     """Reason that a compilation failed, one line with a remedy."""
     program = found.command[0]
-    if any(text in ended.said for text in _NO_SPACE_MESSAGES) or ended.code == -signal.SIGXFSZ:
+    if any(text in ended.output for text in _NO_SPACE_MESSAGES) or ended.code == -signal.SIGXFSZ:
         return (
             f"the C compiler {program} found no space on the disk; free some, or choose another "
             "folder (MSTMM_CACHE; for user-defined elements MSTMM_KERNELS)"
@@ -210,7 +210,7 @@ def _failure_text(found: Compiler, ended: ProcessResult, source: str) -> str:
     if ended.code < 0:
         hint = " (too little memory?)" if -ended.code == signal.SIGKILL else ""
         return f"the C compiler {program} was killed by {ended.signal()}{hint}; see mstmm doctor"
-    lines = [line.strip() for line in ended.said.splitlines() if line.strip()]
+    lines = [line.strip() for line in ended.output.splitlines() if line.strip()]
     error_line = next(
         (line for line in lines if "error" in line), lines[-1] if lines else "no message"
     )

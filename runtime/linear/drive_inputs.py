@@ -42,7 +42,7 @@ class Motion(NamedTuple):
 
 
 #: Driven speeds of one common motion: (index, factor) each.
-Moves = tuple[tuple[int, float], ...]
+DriveFactors = tuple[tuple[int, float], ...]
 
 
 class Columns(NamedTuple):
@@ -59,9 +59,9 @@ def motions(model: CompiledScene) -> dict[str, Motion]:
     Names are such as "platform.displacement", "platform.displacement_rate" and
     "platform.displacement_acceleration".
     """
-    found = dict[str, Motion]()
+    motions_by_name = dict[str, Motion]()
     for slots, k, _ in _driven(model):
-        if slots.straight:
+        if slots.rates_are_speeds:
             unit, speed = slots.u_units[k], slots.u_names[k]
             named = (
                 (slots.q_names[k], slots.q_units[k]),
@@ -69,74 +69,82 @@ def motions(model: CompiledScene) -> dict[str, Motion]:
                 (acceleration_name(speed), rate_unit(unit)),
             )
             for order, (name, of) in enumerate(named):
-                found[f"{slots.name}.{name}"] = Motion(of, slots.u + k, order)
-    return found
+                motions_by_name[f"{slots.name}.{name}"] = Motion(of, slots.u + k, order)
+    return motions_by_name
 
 
 def _driven(model: CompiledScene) -> Iterator[tuple[HingeSlots, int, Expression]]:
     """Yield (slots of the hinge, index of its coordinate, drive) of all driven coordinates."""
-    packed = model.packed
-    for place, k in packed.system.driven:
-        number = packed.topology.at(place)[1]
+    packed = model.packed_scene
+    for tree_index, k in packed.system.driven:
+        number = packed.topology.scene_indices(tree_index)[1]
         drive = (packed.scene.hinges[number].drive or ())[k]
         if drive is not None:
-            yield model.layout.slots(number), k, drive
+            yield model.coordinate_layout.slots(number), k, drive
 
 
-def accelerations(model: CompiledScene, moves: Moves) -> list[str]:
+def accelerations(model: CompiledScene, moves: DriveFactors) -> list[str]:
     """Names of the accelerations of the drives in `moves`."""
     speeds = {speed for speed, _ in moves}
-    return [x for x, one in motions(model).items() if one.order == 2 and one.speed in speeds]
+    return [
+        x for x, motion in motions(model).items() if motion.order == 2 and motion.speed in speeds
+    ]
 
 
 def coordinate(model: CompiledScene, speed: int) -> str:
     """Name of the coordinate whose rate is the speed."""
-    slots = model.layout.hinge_of_speed(speed)
+    slots = model.coordinate_layout.hinge_of_speed(speed)
     return f"{slots.name}.{slots.q_names[speed - slots.u]}"
 
 
-def followers(model: CompiledScene, name: str, t: float) -> Moves:
+def followers(model: CompiledScene, name: str, t: float) -> DriveFactors:
     """Drives that follow an input of the scene, with their slopes with respect to it.
 
     Raises SceneError where a slope depends on time.
     """
-    found, channels = dict[int, float](), model.scene.channels
+    factors, channels = dict[int, float](), model.scene.channels
     for slots, k, drive in _driven(model):
-        names = [one.text for one in drive.names]
+        names = [expression_name.text for expression_name in drive.names]
         if name not in names:
             continue
-        if not slots.straight or not all(x in channels and channels[x].stands for x in names):
+        if not slots.rates_are_speeds or not all(
+            x in channels and channels[x].is_constant for x in names
+        ):
             raise SceneError(
-                f'"{name}": the drive of hinge "{slots.name}" follows this input, and goes by time '
-                "besides; name the motion of the drive itself for an input, or let the input stand "
-                "still"
+                f'"{name}": the drive of hinge "{slots.name}" depends on this input and also '
+                "on time; use the motion of the drive itself as the input, or keep the input "
+                "constant"
             )
-        rule = expression_derivatives(drive, lambda one: channels[one.text].value(t))
-        found[slots.u + k] = sum(slope for one, slope in rule.items() if one.text == name)
-    return tuple(found.items())
+        rule = expression_derivatives(
+            drive, lambda expression_name: channels[expression_name.text].value(t)
+        )
+        factors[slots.u + k] = sum(
+            slope for expression_name, slope in rule.items() if expression_name.text == name
+        )
+    return tuple(factors.items())
 
 
-def columns_of(engine: LoopedEngine, state: State, moves: Moves) -> Columns:
+def drive_columns(engine: LoopedEngine, state: State, moves: DriveFactors) -> Columns:
     """Columns (nu,) of drives of a tree that follow one common motion."""
     along = np.zeros(engine.nu)
     for speed, factor in moves:
         along[speed] += factor
-    return slopes_along(engine, state, along)
+    return residual_derivatives(engine, state, along)
 
 
-def slopes_along(engine: LoopedEngine, state: State, along: Array) -> Columns:
+def residual_derivatives(engine: LoopedEngine, state: State, along: Array) -> Columns:
     """Slopes (nu,) of the residual along a motion of all speeds.
 
     Driven speeds, which are the rates of their coordinates, are included.
     """
-    first, driven = engine.packed.system.places["u"], engine.packed.system.driven
+    first, driven = engine.packed.system.first_indices["u"], engine.packed.system.driven
     engine = _undriven(engine)
     tangent, still = TangentMatrix(engine), np.zeros(engine.nu)
     moved, at_rest = tangent.rates(state.q, along), np.zeros(engine.nq)
-    for speed in (int(first[place]) + k for place, k in driven):
+    for speed in (int(first[tree_index]) + k for tree_index, k in driven):
         slots = engine.packed.layout.hinge_of_speed(speed)
         moved[slots.q + speed - slots.u] = along[speed]
-    tangent.residual(state.t, state.q, state.u, state.a)
+    tangent.residual(state.t, state.q, state.u, state.udot)
     return Columns(
         tangent.slope(0.0, moved, still, still),
         tangent.slope(0.0, at_rest, along, still),

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from .linear_equations import LinearEquations
 
 
-def along(product: Callable[[Array], Array], shapes: NDArray[Any]) -> NDArray[Any]:
+def operator_products(product: Callable[[Array], Array], shapes: NDArray[Any]) -> NDArray[Any]:
     """Product (n, k) of a real operator and each shape, complex shapes in two parts."""
     columns = [
         product(x.real) + (1j * product(x.imag) if np.iscomplexobj(x) else 0.0) for x in shapes.T
@@ -33,64 +33,66 @@ def along(product: Callable[[Array], Array], shapes: NDArray[Any]) -> NDArray[An
 
 def kinetic(linear: LinearEquations, shapes: NDArray[Any]) -> dict[str, Array]:
     """Share (k,) of each body in the kinetic energy of each shape."""
-    return kinetic_of_speeds(linear.model, linear.state.q, linear.spread(shapes))
+    return kinetic_shares(linear.model, linear.state.q, linear.expand(shapes))
 
 
-def kinetic_of_speeds(model: CompiledScene, q: Array, speeds: NDArray[Any]) -> dict[str, Array]:
+def kinetic_shares(model: CompiledScene, q: Array, speeds: NDArray[Any]) -> dict[str, Array]:
     """Share (k,) of each body in the kinetic energy of speeds (nu, k) at q (nq,)."""
-    engine, parts = model.apart, [np.real(speeds)]
+    engine, parts = model.unmerged_engine, [np.real(speeds)]
     if np.iscomplexobj(speeds):
         parts.append(np.imag(speeds))
     energies = np.zeros((speeds.shape[1], engine.packed.topology.count))
     for part in parts:
         energies += engine.kinetic_energies(q, np.ascontiguousarray(part.T))
-    frames = {one.frame for one in engine.packed.system.closures}
-    bodies = [place for place in range(energies.shape[1]) if place not in frames]
-    names = [engine.body_name(place).partition("/")[0] for place in bodies]
+    frames = {closure.frame for closure in engine.packed.system.closures}
+    bodies = [tree_index for tree_index in range(energies.shape[1]) if tree_index not in frames]
+    names = [engine.body_name(tree_index).partition("/")[0] for tree_index in bodies]
     return _parts(names, energies[:, bodies].T)
 
 
-def strain(linear: LinearEquations, shapes: NDArray[Any]) -> dict[str, Array]:
+def strain_shares(linear: LinearEquations, shapes: NDArray[Any]) -> dict[str, Array]:
     """Share (k,) of each owner of coordinates, and of "springs", in the elastic energy."""
-    tree, free = linear.tree, list(linear.model.free_speeds)
-    shapes = linear.spread(shapes)[free]
+    tree, free = linear.open_tree, list(linear.model.free_speed_indices)
+    shapes = linear.expand(shapes)[free]
     whole, lawless, held = (
-        along(_pressed(linear, engine), shapes)
+        operator_products(_stiffness_operator(linear, engine), shapes)
         for engine in (tree, without_laws(tree), with_frozen_springs(tree, linear.state))
     )
-    own = np.real(np.conj(shapes) * (whole - lawless + _by_shapes(linear.model, shapes)))
-    names = [name.rpartition(".")[0] for name, _ in linear.model.increments]
+    own = np.real(
+        np.conj(shapes) * (whole - lawless + _modal_stiffness_product(linear.model, shapes))
+    )
+    names = [name.rpartition(".")[0] for name, _ in linear.model.tangent_increments]
     if not linear.model.scene.forces:
         return _parts(names, own)
     sprung = np.real(np.conj(shapes) * (lawless - held)).sum(axis=0)
     return _parts([*names, "springs"], np.vstack([own, sprung]))
 
 
-def _pressed(linear: LinearEquations, engine: Any) -> Callable[[Array], Array]:
-    """Operator K x of a scene, with x' = G x + du."""
-    pencil = Pencil(engine, linear.state, list(linear.model.free_speeds))
-    turning = linear.turning if linear.mechanism is None else None
+def _stiffness_operator(linear: LinearEquations, engine: Any) -> Callable[[Array], Array]:
+    """Operator x -> K x of a scene; x' = G x + speeds, where it has a rate matrix G."""
+    pencil = Pencil(engine, linear.state, list(linear.model.free_speed_indices))
+    turning = linear.rate_matrix if linear.constrained_motion is None else None
     if turning is None:
         return pencil.stiffness
     return lambda x: pencil.stiffness(x) - pencil.damping(turning @ x)
 
 
-def _by_shapes(model: CompiledScene, x: NDArray[Any]) -> NDArray[Any]:
+def _modal_stiffness_product(model: CompiledScene, x: NDArray[Any]) -> NDArray[Any]:
     """Product (n, k) of the stiffness of flexible bodies and increments x of all free speeds."""
     moved = np.zeros((model.nu, x.shape[1]), dtype=x.dtype)
-    moved[list(model.free_speeds)] = x
+    moved[list(model.free_speed_indices)] = x
     pressed = np.zeros_like(moved)
-    for name, slots in model.layout.modal.items():
-        pressed[slots.u_slice] = model.flexible[name].K @ moved[slots.u_slice]
-    return pressed[list(model.free_speeds)]
+    for name, slots in model.coordinate_layout.modal.items():
+        pressed[slots.u_slice] = model.flexible_bodies[name].K @ moved[slots.u_slice]
+    return pressed[list(model.free_speed_indices)]
 
 
 def _parts(names: Iterable[str], energies: Array) -> dict[str, Array]:
     """Sums of rows (k,) by name relative to the total; nan where the total is zero."""
-    found: dict[str, Array] = {}
+    parts: dict[str, Array] = {}
     for name, row in zip(names, energies, strict=True):
-        found[name] = found[name] + row if name in found else row
+        parts[name] = parts[name] + row if name in parts else row
     total = energies.sum(axis=0)
     with np.errstate(all="ignore"):
         return {name: np.where(np.abs(total) > 0, row / total, np.nan)
-                for name, row in found.items()}  # fmt: skip
+                for name, row in parts.items()}  # fmt: skip

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mstmm.array_validation import Array
 from mstmm.errors import SceneError
 from mstmm.optional_packages import missing_package_error
 
@@ -17,29 +18,41 @@ from ..platform_support.safe_files import replace_atomically, require_path, seal
 if TYPE_CHECKING:
     from .state_space import StateSpace
 
-#: Saved matrices of a linear model: name, row dimension and column dimension.
-MATRICES = (
-    ("M", "coordinate", "coordinate"), ("C", "coordinate", "coordinate"),
-    ("K", "coordinate", "coordinate"), ("damping", "coordinate", "coordinate"),
-    ("gyroscopic", "coordinate", "coordinate"), ("elastic", "coordinate", "coordinate"),
-    ("geometric", "coordinate", "coordinate"), ("load", "coordinate", "coordinate"),
-    ("C_driven", "coordinate", "drive"), ("K_driven", "coordinate", "drive"),
-    ("V", "coordinate", "input"), ("W", "coordinate", "disturbance"), ("A", "state", "state"),
-    ("B", "state", "input"), ("B_disturbances", "state", "disturbance"),
-)  # fmt: skip
+#: Saved matrices of a linear model: row dimension and column dimension by name in the file.
+MATRICES = {
+    **dict.fromkeys(
+        ("M", "C", "K", "damping", "gyroscopic", "elastic", "geometric", "load"),
+        ("coordinate", "coordinate"),
+    ),
+    "C_driven": ("coordinate", "drive"), "K_driven": ("coordinate", "drive"),
+    "V": ("coordinate", "input"), "W": ("coordinate", "disturbance"),
+    "A": ("state", "state"), "B": ("state", "input"), "B_disturbances": ("state", "disturbance"),
+}  # fmt: skip
+
+#: Attributes of `Linear` with another name than their matrix in the file.
+_ATTRIBUTES = {
+    "damping": "C_damping", "gyroscopic": "C_gyroscopic", "elastic": "K_elastic",
+    "geometric": "K_geometric", "load": "K_load", "C_driven": "C_prescribed",
+    "K_driven": "K_prescribed",
+}  # fmt: skip
 
 
 def names(linear: StateSpace) -> dict[str, tuple[str, ...]]:
     """Names along each dimension of the matrices."""
     return {
-        "coordinate": linear.coordinates, "state": linear.states, "input": linear.inputs,
-        "disturbance": linear.disturbances, "drive": linear.driven,
-    }  # fmt: skip
+        "coordinate": linear.coordinate_names,
+        "state": linear.state_names,
+        "input": linear.input_names,
+        "disturbance": linear.disturbance_names,
+        "drive": linear.prescribed_coordinates,
+    }
 
 
-def _there(linear: StateSpace) -> list[tuple[str, str, str]]:
-    """Entries of `MATRICES` that the model has."""
-    return [one for one in MATRICES if linear.has_stiffness or "state" in one[1:]]
+def _matrices(linear: StateSpace) -> Iterator[tuple[str, str, str, Array]]:
+    """Yield name, row dimension, column dimension and values of the matrices of the model."""
+    for key, (row, column) in MATRICES.items():
+        if linear.has_stiffness or "state" in (row, column):
+            yield key, row, column, getattr(linear, _ATTRIBUTES.get(key, key))
 
 
 def dictionary(linear: StateSpace) -> dict[str, Any]:
@@ -47,10 +60,10 @@ def dictionary(linear: StateSpace) -> dict[str, Any]:
     state = linear.state
     return {
         "t": state.t, "q": state.q.tolist(), "u": state.u.tolist(),
-        "coordinates": list(linear.coordinates), "units": list(linear.units),
-        "inputs": list(linear.inputs), "disturbances": list(linear.disturbances),
-        "driven": list(linear.driven),
-        **{key: getattr(linear, key).tolist() for key, _, _ in _there(linear)},
+        "coordinates": list(linear.coordinate_names), "units": list(linear.coordinate_units),
+        "inputs": list(linear.input_names), "disturbances": list(linear.disturbance_names),
+        "driven": list(linear.prescribed_coordinates),
+        **{key: values.tolist() for key, _, _, values in _matrices(linear)},
     }  # fmt: skip
 
 
@@ -58,8 +71,8 @@ def dataset(linear: StateSpace) -> Any:
     """`xarray.Dataset` of the matrices with row and column names."""
     along = names(linear)
     arrays = {
-        key: ((row, f"{column}2" if column == row else column), getattr(linear, key))
-        for key, row, column in _there(linear)
+        key: ((row, f"{column}2" if column == row else column), values)
+        for key, row, column, values in _matrices(linear)
     }
     coords = dict(along) | {f"{key}2": along[key] for key in ("coordinate", "state")}
     return xarray().Dataset(
@@ -71,8 +84,7 @@ def entries(linear: StateSpace) -> Iterator[tuple[str, ...]]:
     """Yield a header, then each nonzero entry: matrix, row, column, value."""
     along = names(linear)
     yield "matrix", "row", "column", "value"
-    for key, row, column in _there(linear):
-        values = getattr(linear, key)
+    for key, row, column, values in _matrices(linear):
         for i, j in zip(*np.nonzero(values), strict=True):
             yield key, along[row][i], along[column][j], repr(float(values[i, j]))
 
@@ -86,10 +98,10 @@ def save(given: str | Path, dataset: Callable[[], Any], rows: Iterator[tuple[str
     ending = path.suffix.lower()
     if ending not in (".nc", ".csv"):
         raise SceneError(f'file "{path}": expected a name that ends in .nc or .csv')
-    made = dataset() if ending == ".nc" else None
+    built_dataset = dataset() if ending == ".nc" else None
     with replace_atomically(path) as temporary:
-        if made is not None:
-            made.to_netcdf(temporary, engine="h5netcdf")
+        if built_dataset is not None:
+            built_dataset.to_netcdf(temporary, engine="h5netcdf")
             seal(temporary)
         else:
             with temporary.open("w", newline="", encoding="utf-8") as file:

@@ -18,18 +18,29 @@ from numpy.typing import ArrayLike, NDArray
 
 from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure, SceneError
-from mstmm.risk import AssessedAnswer, DeferredRisks, Risk
+from mstmm.risk import AssessedResult, DeferredRisks, Risk
 
 from ..engine.characteristic_scales import speed_scales
 from ..engine.harmonic_response import HarmonicResponse
 from ..risk_checks.shape_range import response_range_risks
 from . import file_formats
-from .harmonic.damping_checks import is_requested, refuse_drives, refuse_in_motion, refuse_ratios
-from .harmonic.exact_beams import Chosen, ExactBeams, exact_beams, refuse_distributed, refuse_inner
+from .harmonic.damping_checks import (
+    check_state_at_rest,
+    is_requested,
+    reject_drives,
+    reject_modal_damping,
+)
+from .harmonic.exact_beams import (
+    BeamSelection,
+    ExactBeams,
+    exact_beams,
+    reject_distributed,
+    reject_inner_names,
+)
 from .harmonic.harmonic_solve import Amplitudes
 from .harmonic.hysteretic_damping import Losses, stiffer
 from .harmonic.modal_damping import Ratios, modal_damping
-from .harmonic.steady_states import find_time_risks, refuse_turning, refuse_unsteady
+from .harmonic.steady_states import check_steady, find_time_risks, reject_rotating_balls
 from .harmonic.unshaped_response import unshaped_response_risks
 from .harmonic_loads import HarmonicLoads
 from .input_channels import Channel, channel, some_names
@@ -61,23 +72,23 @@ _FASTEST = 1e100
 
 
 @dataclass(frozen=True, eq=False)
-class FrequencyResponse(AssessedAnswer):
+class FrequencyResponse(AssessedResult):
     """Amplitudes of outputs under inputs cos(omega t) of unit amplitude.
 
     Attributes:
         omega: (k,) requested angular frequencies, rad/s.
-        inputs, outputs: names.
+        input_names, output_names: names.
         input_units, output_units: their units.
-        values: (k, outputs, inputs) complex; an output is Re(values exp(i omega t)).
+        response: (k, outputs, inputs) complex; an output is Re(values exp(i omega t)).
         findings: risks of the linear model and of this response.
     """
 
     omega: Array = field(repr=False)
-    inputs: tuple[str, ...]
-    outputs: tuple[str, ...]
+    input_names: tuple[str, ...]
+    output_names: tuple[str, ...]
     input_units: tuple[str, ...] = field(repr=False)
     output_units: tuple[str, ...] = field(repr=False)
-    values: Complex = field(repr=False)
+    response: Complex = field(repr=False)
     findings: Iterable[Risk] = field(default=(), repr=False)
 
     @property
@@ -88,12 +99,12 @@ class FrequencyResponse(AssessedAnswer):
     @property
     def magnitude(self) -> Array:
         """Magnitude (k, outputs, inputs) in output units per input unit."""
-        return np.abs(self.values)
+        return np.abs(self.response)
 
     @property
     def phase(self) -> Array:
         """Phase (k, outputs, inputs), rad in (-pi, pi]; negative where the output lags."""
-        return np.angle(self.values)
+        return np.angle(self.response)
 
     def plot(self, path: str | Path | None = None) -> Any:
         """Bode plot as a `matplotlib.figure.Figure`, written to `path` if given.
@@ -111,7 +122,7 @@ class FrequencyResponse(AssessedAnswer):
         unit = units[0] if len(set(units)) == 1 else "units of the curves"
         return bode(self.frequency, values, labels, unit, path)
 
-    def nyquist(self, path: str | Path | None = None) -> Any:
+    def plot_nyquist(self, path: str | Path | None = None) -> Any:
         """Nyquist plot as a `matplotlib.figure.Figure`; see `plot`."""
         from .plots.bode_and_locus import nyquist
 
@@ -119,29 +130,29 @@ class FrequencyResponse(AssessedAnswer):
 
     def _curves(self) -> tuple[Complex, list[str]]:
         """Values (k, curves) and the label of each curve."""
-        labels = [f"{y} / {u}" for y in self.outputs for u in self.inputs]
-        return self.values.reshape(len(self.omega), -1), labels
+        labels = [f"{y} / {u}" for y in self.output_names for u in self.input_names]
+        return self.response.reshape(len(self.omega), -1), labels
 
     def to_dict(self) -> dict[str, Any]:
         """All data as a dictionary for JSON, with real and imaginary parts."""
         return {
             "omega": self.omega.tolist(), "frequency": self.frequency.tolist(),
-            "inputs": list(self.inputs), "outputs": list(self.outputs),
+            "inputs": list(self.input_names), "outputs": list(self.output_names),
             "input_units": list(self.input_units), "output_units": list(self.output_units),
-            "real": self.values.real.tolist(), "imag": self.values.imag.tolist(),
+            "real": self.response.real.tolist(), "imag": self.response.imag.tolist(),
             **self.assessment(),
         }  # fmt: skip
 
-    def to_dataset(self) -> Any:
+    def to_xarray(self) -> Any:
         """`xarray.Dataset` with real and imaginary parts; EnvironmentFailure without the extra."""
         along = ("omega", "output", "input")
         arrays: dict[str, Any] = {
-            "real": (along, self.values.real), "imag": (along, self.values.imag),
+            "real": (along, self.response.real), "imag": (along, self.response.imag),
             "magnitude": (along, self.magnitude), "phase": (along, self.phase, {"units": "rad"}),
         }  # fmt: skip
         coords: dict[str, Any] = {
             "omega": ("omega", self.omega, {"units": "rad/s"}),
-            "output": list(self.outputs), "input": list(self.inputs),
+            "output": list(self.output_names), "input": list(self.input_names),
         }  # fmt: skip
         return file_formats.xarray().Dataset(arrays, coords)
 
@@ -159,7 +170,7 @@ class FrequencyResponse(AssessedAnswer):
 
         Raises SceneError for another file extension, EnvironmentFailure without the extra.
         """
-        return file_formats.save(path, self.to_dataset, self._rows())
+        return file_formats.save(path, self.to_xarray, self._rows())
 
 
 def frequency_response(
@@ -169,30 +180,30 @@ def frequency_response(
     outputs: Sequence[str] | None,
     structural: Losses = 0.0,
     modal: Ratios = 0.0,
-    exact: Chosen = False,
+    exact: BeamSelection = False,
 ) -> FrequencyResponse:
     """Frequency response of a linear model; see `Linear.frequency_response`."""
     frequencies = angular_frequencies(omega)
     beams = None
     if exact is not False:
-        refuse_turning(linear)
-        refuse_ratios(modal)
+        reject_rotating_balls(linear)
+        reject_modal_damping(modal)
         beams = exact_beams(linear, exact, structural)
-        refuse_inner(beams, [*(inputs or ()), *read_by(linear, outputs)])
+        reject_inner_names(beams, [*(inputs or ()), *read_by(linear, outputs)])
         linear = beams.linear
         if outputs is None and not linear.model.scene.output:
-            outputs = [name for name in linear.coordinates if not beams.named(name)]
+            outputs = [name for name in linear.coordinate_names if not beams.has_coordinate(name)]
             if not outputs:
                 raise SceneError(
-                    "exact: all coordinates are shapes of beams; name outputs, such as "
+                    "exact: all coordinates are those of beam shapes; give outputs, such as "
                     f'"{beams.names[0]}.tip.y"'
                 )
-    pushes = chosen_pushes(linear, inputs)
+    pushes = select_inputs(linear, inputs)
     if beams is not None:
-        refuse_distributed(beams, pushes)
-    refuse_drives(pushes, beams is not None or is_requested(structural))
+        reject_distributed(beams, pushes)
+    reject_drives(pushes, beams is not None or is_requested(structural))
     shown = outputs_of(linear, None if outputs is None else some_names("outputs", outputs))
-    refuse_unsteady(linear, pushes, shown)
+    check_steady(linear, pushes, shown)
     values = _Sweep(linear, pushes, shown, structural, modal, beams).values(frequencies)
     exact_names = () if beams is None else beams.names
 
@@ -204,13 +215,13 @@ def frequency_response(
             yield from unshaped_response_risks(linear, pushes, frequencies, respond)
 
     def respond(of: LinearEquations, by: Sequence[Channel], at: Array) -> tuple[Complex, Array]:
-        read = outputs_of(of, [one.name for one in shown])
+        read = outputs_of(of, [quantity.name for quantity in shown])
         ratio = modal if isinstance(modal, (int, float)) else 0.0
         return _Sweep(of, by, read, structural, ratio, None).values_and_rounding(at)
 
     return FrequencyResponse(
-        frequencies, tuple(one.name for one in pushes), tuple(one.name for one in shown),
-        tuple(one.unit for one in pushes), tuple(one.unit for one in shown), values,
+        frequencies, tuple(entry.name for entry in pushes), tuple(entry.name for entry in shown),
+        tuple(entry.unit for entry in pushes), tuple(entry.unit for entry in shown), values,
         DeferredRisks(find_risks),
     )  # fmt: skip
 
@@ -223,37 +234,37 @@ def _ratio(output: str, pushed: str) -> str:
 def angular_frequencies(omega: ArrayLike) -> Array:
     """Validated angular frequencies (k,) in rad/s; SceneError for invalid values."""
     try:
-        found = np.array(omega, dtype=np.float64).reshape(-1)
+        frequencies = np.array(omega, dtype=np.float64).reshape(-1)
     except (TypeError, ValueError):
         raise SceneError(f"omega = {omega!r}: expected angular frequencies in rad/s") from None
-    if not found.size:
+    if not frequencies.size:
         raise SceneError("omega is empty: give angular frequencies in rad/s")
-    wrong = found[~((found > 0) & (found < _FASTEST))]
+    wrong = frequencies[~((frequencies > 0) & (frequencies < _FASTEST))]
     if wrong.size:
         raise SceneError(
             f"omega = {wrong[0]:.9g}: expected angular frequencies above 0 and below "
-            f"{_FASTEST:g} in rad/s (of Hz 2 pi times as many)"
+            f"{_FASTEST:g} in rad/s (2 pi times the frequency in Hz)"
         )
-    return found
+    return frequencies
 
 
-def chosen_pushes(linear: LinearEquations, inputs: Sequence[str] | None) -> Sequence[Channel]:
+def select_inputs(linear: LinearEquations, inputs: Sequence[str] | None) -> Sequence[Channel]:
     """Named inputs, else those of the model, else its disturbances; SceneError for none."""
     if inputs is not None:
         return [channel(linear.model, name) for name in some_names("inputs", inputs)]
-    pushes = linear.controls or linear.others
+    pushes = linear.input_channels or linear.disturbance_channels
     if not pushes:
-        raise SceneError("frequency response: the model has no inputs; name some")
+        raise SceneError("frequency response: the model has no inputs; give inputs")
     return pushes
 
 
 def _efforts(linear: LinearEquations, pushes: Sequence[Channel]) -> Array:
     """Efforts (n, pushes) per unit of each input; matrices cached by the model are reused."""
-    if pushes is linear.controls:
+    if pushes is linear.input_channels:
         return linear.V
-    if pushes is linear.others:
+    if pushes is linear.disturbance_channels:
         return linear.W
-    return linear.pushed(pushes)
+    return linear.input_matrix(pushes)
 
 
 class _Sweep:
@@ -263,15 +274,15 @@ class _Sweep:
         self, linear: LinearEquations, pushes: Sequence[Channel], outputs: Sequence[LinearQuantity],
         structural: Losses, modal: Ratios, beams: ExactBeams | None,
     ) -> None:  # fmt: skip
-        engine, free = linear.tree, list(linear.free)
-        refuse_in_motion(linear, structural, modal)
+        engine, free = linear.open_tree, list(linear.free_speed_indices)
+        check_state_at_rest(linear, structural, modal)
         lossy = stiffer(linear, structural) if is_requested(structural) else None
         self.modal = modal_damping(linear, modal) if is_requested(modal) else None
         self.engine, self.response = engine, _response(linear, lossy, beams)
         efforts = np.zeros((len(pushes), engine.nu))
         efforts[:, free] = _efforts(linear, pushes).T
-        self.pushed = HarmonicLoads.of(linear, pushes, efforts)
-        self.columns, self.count = self.pushed.columns, len(self.pushed.columns)
+        self.loads = HarmonicLoads.from_efforts(linear, pushes, efforts)
+        self.columns, self.count = self.loads.columns, len(self.loads.columns)
         if self.modal is not None:
             damping = np.zeros((self.modal.columns.shape[1], engine.nu))
             damping[:, free] = self.modal.columns.T
@@ -279,8 +290,10 @@ class _Sweep:
         self.free, rows = free, rows_of(linear, outputs, pushes)
         self.sizes = speed_scales(linear.model)
         self.rows = {order: wide[:, free] for order, wide in rows.orders.items()}
-        self.carried = {order: self.pushed.carried(wide) for order, wide in rows.orders.items()}
-        self.through = rows.through
+        self.drive_contributions = {
+            order: self.loads.drive_contributions(wide) for order, wide in rows.orders.items()
+        }
+        self.feedthrough = rows.feedthrough
 
     def values(self, omega: Array) -> Complex:
         """Response (k, outputs, inputs) at angular frequencies (k,)."""
@@ -291,15 +304,15 @@ class _Sweep:
     def values_and_rounding(self, omega: Array) -> tuple[Complex, Array]:
         """Response as by `values`, and its rounding level (outputs, inputs)."""
         s = np.asarray(1j * omega, dtype=np.complex128)
-        return self.values(omega), _NOISE * self._reach(s, self._at(s)[-1])
+        return self.values(omega), _NOISE * self._response_bound(s, self._evaluate(s)[-1])
 
     def _batch(self, omega: Array) -> Complex:
-        values, growth, grown, _ = self._at(np.asarray(1j * omega, dtype=np.complex128))
+        values, growth, grown, _ = self._evaluate(np.asarray(1j * omega, dtype=np.complex128))
         for k in np.flatnonzero(~(growth < _GROWN)):
-            values[k] = self._around(float(omega[k]), values[k], growth[k], int(grown[k]))
+            values[k] = self._circle_mean(float(omega[k]), values[k], growth[k], int(grown[k]))
         return values
 
-    def _at(self, s: Complex) -> tuple[Complex, Array, NDArray[np.int32], Complex]:
+    def _evaluate(self, s: Complex) -> tuple[Complex, Array, NDArray[np.int32], Complex]:
         """Response at s (k,), with the growth of the elimination.
 
         Returns values (k, outputs, inputs), growth (k,), the bodies (k,) of largest growth, and
@@ -309,17 +322,17 @@ class _Sweep:
         moved = x[:, : self.count, self.free]
         if self.modal is not None:
             moved = self.modal.damp(s, moved, x[:, self.count :, self.free])
-        found = np.zeros((len(s), *self.through.shape), dtype=np.complex128)
-        found += self.through
+        values = np.zeros((len(s), *self.feedthrough.shape), dtype=np.complex128)
+        values += self.feedthrough
         for order, rows in self.rows.items():
             answers = rows @ moved.swapaxes(1, 2)
-            found += s[:, None, None] ** order * self.pushed.summed(s, answers)
-            for j, (power, column) in self.carried[order].items():
-                found[:, :, j] += s[:, None] ** (order + power) * column
-        growth[~np.isfinite(found).all(axis=(1, 2))] = np.inf
-        return found, growth, grown, moved
+            values += s[:, None, None] ** order * self.loads.sum_by_input(s, answers)
+            for j, (power, column) in self.drive_contributions[order].items():
+                values[:, :, j] += s[:, None] ** (order + power) * column
+        growth[~np.isfinite(values).all(axis=(1, 2))] = np.inf
+        return values, growth, grown, moved
 
-    def _around(self, omega: float, straight: Complex, growth: float, body: int) -> Complex:
+    def _circle_mean(self, omega: float, straight: Complex, growth: float, body: int) -> Complex:
         """Response where the elimination lost digits: the most accurate of it and circle means.
 
         Raises NumericalFailure at a resonance without damping.
@@ -328,9 +341,9 @@ class _Sweep:
         turns = np.exp(2j * np.pi * (np.arange(_POINTS) + 0.5) / _POINTS)
         for part in _CIRCLES:
             s = np.asarray(omega * (1j + part * turns), np.complex128)
-            values, growths, _, moved = self._at(s)
+            values, growths, _, moved = self._evaluate(s)
             lost = max(
-                _pole_share(values, turns, _NOISE * self._reach(s, moved)),
+                _pole_share(values, turns, _NOISE * self._response_bound(s, moved)),
                 _ROUNDING * float(growths.max()),
             )
             if lost < unknown:
@@ -338,15 +351,15 @@ class _Sweep:
             if unknown < _GOOD:
                 break
         if not unknown < _LOST:
-            where = f': hinge "{self.engine.hinge_name(body)}"' if body >= 0 else ""
+            hinge_text = f' of hinge "{self.engine.hinge_name(body)}" and its outboard bodies'
+            where = hinge_text if body >= 0 else ""
             raise NumericalFailure(
-                f"frequency response: omega = {omega:.9g} rad/s is a resonance without damping"
-                f"{where} and what it carries answer without bound; add damping, or leave this "
-                "frequency out"
+                f"frequency response: omega = {omega:.9g} rad/s is an undamped resonance{where}; "
+                "add damping, or leave this frequency out"
             )
         return best
 
-    def _reach(self, s: Complex, moved: Complex) -> Array:
+    def _response_bound(self, s: Complex, moved: Complex) -> Array:
         """Bound (outputs, inputs) of the response at s (k,).
 
         It assumes that every coordinate moves as far, relative to its scale, as the one that moves
@@ -355,7 +368,7 @@ class _Sweep:
         sizes = self.sizes[self.free]
         most = (np.abs(moved) / sizes).max(axis=(0, 2), initial=0.0)
         size = float(np.abs(s).max())
-        inputs = self.pushed.summed(np.array([size]), most[None, None]).real[0, 0]
+        inputs = self.loads.sum_by_input(np.array([size]), most[None, None]).real[0, 0]
         outputs = [size**order * (np.abs(rows) @ sizes) for order, rows in self.rows.items()]
         return np.outer(np.sum(outputs, axis=0), inputs)
 
@@ -364,12 +377,12 @@ def _response(
     linear: LinearEquations, lossy: LoopedEngine | None, beams: ExactBeams | None
 ) -> HarmonicResponse | Amplitudes:
     """Solver for amplitudes: elimination for a tree at rest, else from matrices."""
-    state, loops = linear.state, linear.mechanism
-    if loops is not None or linear.turning is not None or linear.carrying is not None:
+    state, loops = linear.state, linear.constrained_motion
+    if loops is not None or linear.rate_matrix is not None or linear.frame_transform is not None:
         lost = None if loops is None or lossy is None else loops.matrices(lossy, state)
-        return Amplitudes(linear.free, Matrices(linear.M, linear.C, linear.K), lost)
+        return Amplitudes(linear.free_speed_indices, Matrices(linear.M, linear.C, linear.K), lost)
     return HarmonicResponse(
-        linear.tree, state.t, state.q, state.u, state.a, stiffer=lossy,
+        linear.open_tree, state.t, state.q, state.u, state.udot, stiffer=lossy,
         exact=None if beams is None else beams.bodies,
     )  # fmt: skip
 

@@ -39,18 +39,18 @@ def with_frozen_springs(engine: LoopedEngine, state: State) -> LoopedEngine:
     """
     system = engine.packed.system
     springs = (force for force in system.forces if force.element == ("force", "spring"))
-    held = tuple(_held(engine, spring, state) for spring in springs)
+    held = tuple(_frozen_spring(engine, spring, state) for spring in springs)
     return LoopedEngine(packed_system(replace(system, laws=(), forces=held), engine.packed))
 
 
-def standing(engine: LoopedEngine, state: State) -> LoopedEngine:
+def with_frozen_loads(engine: LoopedEngine, state: State) -> LoopedEngine:
     """Variant as by `with_frozen_springs`, with loads also constant in inertial axes."""
     held = with_frozen_springs(engine, state)
     system = held.packed.system
     values = _values(system, state).tolist()
-    loads = tuple(_dead(engine, load, values, state) for load in system.loads)
-    made = replace(system, loads=loads, values=constant_kernel("values", system, values))
-    return LoopedEngine(packed_system(made, engine.packed))
+    loads = tuple(_frozen_load(engine, load, values, state) for load in system.loads)
+    frozen_system = replace(system, loads=loads, values=constant_kernel("values", system, values))
+    return LoopedEngine(packed_system(frozen_system, engine.packed))
 
 
 def with_springs_grounded(engine: LoopedEngine, state: State) -> LoopedEngine:
@@ -64,51 +64,53 @@ def with_springs_grounded(engine: LoopedEngine, state: State) -> LoopedEngine:
     for k, force in enumerate(system.forces):
         if min(body for body, _, _ in force.ends) < 0:
             continue
-        seen = _seen(engine, [Probe(*end) for end in force.ends], state)
+        seen = _observed_points(engine, [Probe(*end) for end in force.ends], state)
         still = [(-1, tuple(pose[15:24].tolist()), tuple(pose[0:3].tolist())) for pose in seen]
         first[k] = replace(force, ends=(force.ends[0], still[1]))
         second.append(replace(force, ends=(still[0], force.ends[1])))
-    made = replace(system, forces=(*first, *second))
-    return LoopedEngine(packed_system(made, engine.packed))
+    grounded_system = replace(system, forces=(*first, *second))
+    return LoopedEngine(packed_system(grounded_system, engine.packed))
 
 
 def _values(system: System, state: State) -> Array:
     """Values of the expressions of a scene at a state."""
     if system.values is None:
         return np.zeros(0)
-    given = _given(system, state)
+    given = _expression_arguments(system, state)
     return TapeKernel(system.values).run(given)[1]["values"][: system.n_values].copy()
 
 
-def _given(system: System, state: State) -> dict[str, Array]:
+def _expression_arguments(system: System, state: State) -> dict[str, Array]:
     """Arguments of the expressions of a scene at a state."""
     inputs = system.inputs_at(state.t)
     return {"t": np.array([state.t]), "q": state.q, "u": state.u, INPUTS: inputs}
 
 
-def _dead(
+def _frozen_load(
     engine: LoopedEngine, load: LoadNumbers, values: list[float], state: State
 ) -> LoadNumbers:
     """Load with constant components in inertial axes, which are appended to `values`."""
     if load.axes < 0:
         return load
-    turned = _seen(engine, [Probe(load.axes, load.axes_own, (0.0, 0.0, 0.0))], state)
+    turned = _observed_points(engine, [Probe(load.axes, load.axes_own, (0.0, 0.0, 0.0))], state)
     rotation = turned[0, 15:24].reshape(3, 3)
-    places = []
+    entries_found = []
     for entries in (load.force, load.moment):
-        components = [0.0 if place < 0 else values[place] for place in entries]
-        places.append(tuple(range(len(values), len(values) + 3)))
+        components = [0.0 if index < 0 else values[index] for index in entries]
+        entries_found.append(tuple(range(len(values), len(values) + 3)))
         values += (rotation @ components).tolist()
-    return replace(load, axes=-1, axes_own=INERTIAL, force=places[0], moment=places[1])
+    return replace(
+        load, axes=-1, axes_own=INERTIAL, force=entries_found[0], moment=entries_found[1]
+    )
 
 
-def _held(engine: LoopedEngine, spring: ForceNumbers, state: State) -> ForceNumbers:
+def _frozen_spring(engine: LoopedEngine, spring: ForceNumbers, state: State) -> ForceNumbers:
     """Spring with the constant tension of the state."""
     length, rate = spring_length(engine, spring, state)
     stiffness, rest, damping = spring.p
     effort = -stiffness * (length - rest) - damping * rate
     if spring.effort is not None:
-        given = _given(engine.packed.system, state)
+        given = _expression_arguments(engine.packed.system, state)
         kernel = TapeKernel(spring.effort)
         effort += float(kernel.run({**given, "length": np.array([length, rate])})[1]["values"][0])
     constant = constant_kernel("effort", engine.packed.system, [effort])
@@ -117,7 +119,7 @@ def _held(engine: LoopedEngine, spring: ForceNumbers, state: State) -> ForceNumb
 
 def spring_length(engine: LoopedEngine, spring: ForceNumbers, state: State) -> tuple[float, float]:
     """Length (m) and rate (m/s) of a spring at a state."""
-    seen = _seen(engine, [Probe(*end) for end in spring.ends], state)
+    seen = _observed_points(engine, [Probe(*end) for end in spring.ends], state)
     apart, moving = seen[1, 0:3] - seen[0, 0:3], seen[1, 3:6] - seen[0, 3:6]
     length = float(np.linalg.norm(apart))
     return length, float(apart @ moving) / length
@@ -125,14 +127,16 @@ def spring_length(engine: LoopedEngine, spring: ForceNumbers, state: State) -> t
 
 def bushing_deflection(engine: LoopedEngine, bushing: ForceNumbers, state: State) -> Array:
     """Deflection (6,) of a bushing at a state, in its own axes."""
-    rest, end = _seen(engine, [Probe(*one) for one in bushing.ends], state)
+    rest, end = _observed_points(
+        engine, [Probe(*bushing_end) for bushing_end in bushing.ends], state
+    )
     return deflection_of((rest[None], end[None]))[0]
 
 
-def _seen(engine: LoopedEngine, probes: list[Probe], state: State) -> Array:
+def _observed_points(engine: LoopedEngine, probes: list[Probe], state: State) -> Array:
     """Values (probes, 24) of `Observation.points` at a state."""
-    found = engine.observe(
+    observations = engine.observe(
         np.array([state.t]), state.q[None], state.u[None], engine.start_memory()[None], probes,
         parts=("points",),
     )  # fmt: skip
-    return found.points[0]
+    return observations.points[0]

@@ -24,55 +24,55 @@ class HarmonicLoads:
     """Effort columns of harmonic inputs.
 
     Attributes:
-        pushes: (p,) inputs.
+        inputs: (p,) inputs.
         columns: (c, nu) efforts; a drive has several columns because it also moves its coordinate.
         powers: (c,) power of s that multiplies each column.
         parts: (c, p) assignment of columns to inputs.
     """
 
-    pushes: Sequence[Channel]
+    inputs: Sequence[Channel]
     columns: Array
     powers: NDArray[np.int64]
     parts: Array  # (c, p)
 
     @classmethod
-    def of(
+    def from_efforts(
         cls, linear: LinearEquations, pushes: Sequence[Channel], efforts: Array
     ) -> HarmonicLoads:
         """Columns from efforts (p, nu) of the inputs; for drives, of their accelerations."""
         columns, owners = list(efforts), list(range(len(pushes)))
-        powers = [2 - one.drive if one.drive >= 0 else 0 for one in pushes]
-        for j, one in enumerate(pushes):
-            if one.drive >= 0:
-                moved = linear.driving(one.moves)
-                columns += [-_placed(linear, x) for x in (moved.stiffness, moved.damping)]
-                powers += [-one.drive, 1 - one.drive]
+        powers = [2 - channel.drive if channel.drive >= 0 else 0 for channel in pushes]
+        for j, channel in enumerate(pushes):
+            if channel.drive >= 0:
+                moved = linear.drive_columns(channel.drive_factors)
+                columns += [-_expand(linear, x) for x in (moved.stiffness, moved.damping)]
+                powers += [-channel.drive, 1 - channel.drive]
                 owners += [j, j]
         parts = np.eye(len(pushes))[owners]
         wide = np.reshape(columns, (len(columns), linear.model.nu))
         return cls(pushes, wide, np.array(powers, dtype=np.int64), parts)
 
-    def summed(self, s: Complex, answers: Complex) -> Complex:
+    def sum_by_input(self, s: Complex, answers: Complex) -> Complex:
         """Responses (k, outputs, p) to the inputs from responses (k, outputs, c) to the columns."""
-        if len(self.columns) == len(self.pushes) and not self.powers.any():
+        if len(self.columns) == len(self.inputs) and not self.powers.any():
             return answers
         return (answers * s[:, None, None] ** self.powers) @ self.parts
 
-    def carried(self, rows: Array) -> dict[int, tuple[int, Array]]:
+    def drive_contributions(self, rows: Array) -> dict[int, tuple[int, Array]]:
         """Direct contribution of the motion of drives to outputs.
 
         Maps the index of an input to a power of s and a column (outputs,).
         """
-        found = {}
-        for j, one in enumerate(self.pushes):
-            if one.moves:
-                speeds, factors = zip(*one.moves, strict=True)
-                found[j] = -one.drive, rows[:, speeds] @ np.array(factors)
-        return found
+        contributions = {}
+        for j, channel in enumerate(self.inputs):
+            if channel.drive_factors:
+                speeds, factors = zip(*channel.drive_factors, strict=True)
+                contributions[j] = -channel.drive, rows[:, speeds] @ np.array(factors)
+        return contributions
 
 
-def _placed(linear: LinearEquations, x: Array) -> Array:
+def _expand(linear: LinearEquations, x: Array) -> Array:
     """Vector (nu,) with the entries of x (n,) at the indices of its speeds."""
-    found = np.zeros(linear.model.nu)
-    found[list(linear.free)] = x
-    return found
+    expanded = np.zeros(linear.model.nu)
+    expanded[list(linear.free_speed_indices)] = x
+    return expanded

@@ -31,7 +31,7 @@ from ..engine.tangent_matrix import TangentMatrix
 from ..packing.expression_tapes import constant_kernel
 from ..packing.scene_packing import packed_system
 from ..packing.system import LoadNumbers
-from .drive_inputs import Moves, accelerations, columns_of, followers, motions
+from .drive_inputs import DriveFactors, accelerations, drive_columns, followers, motions
 from .frozen_loads import INERTIAL
 from .mck_matrices import State
 
@@ -56,7 +56,7 @@ class Channel:
         input: index of an input of the scene, or -1.
         spring: index of a spring with an effort, or -1.
         drive: order of the time derivative of a motion of drives, or -1.
-        moves: drives that follow the channel, with factors.
+        drive_factors: drives that follow the channel, with factors.
     """
 
     name: str
@@ -68,10 +68,10 @@ class Channel:
     input: int = -1
     spring: int = -1
     drive: int = -1
-    moves: Moves = ()
+    drive_factors: DriveFactors = ()
 
 
-def names_of(what: str, names: Sequence[str]) -> Sequence[str]:
+def require_names(what: str, names: Sequence[str]) -> Sequence[str]:
     """Validated list of names; SceneError for anything else."""
     if isinstance(names, str) or not isinstance(names, Iterable):
         raise SceneError(f'{what} = {names!r}: expected a list of names, such as ["{names}"]')
@@ -82,8 +82,8 @@ def names_of(what: str, names: Sequence[str]) -> Sequence[str]:
 
 def some_names(what: str, names: Sequence[str]) -> Sequence[str]:
     """Validated list of at least one name; SceneError for anything else."""
-    if not names_of(what, names):
-        raise SceneError(f"{what} is empty: leave it out, or name some")
+    if not require_names(what, names):
+        raise SceneError(f"{what} is empty: expected one name or more; give names, or leave it out")
     return names
 
 
@@ -92,23 +92,27 @@ def input_channels(model: CompiledScene, what: str, names: Sequence[str]) -> tup
 
     Raises SceneError for other motions of drives.
     """
-    found = tuple(channel(model, name) for name in names_of(what, names))
-    for one in found:
-        if 0 <= one.drive < 2:
-            instead = ", ".join(f'"{x}"' for x in accelerations(model, one.moves))
+    channels = tuple(channel(model, name) for name in require_names(what, names))
+    for given in channels:
+        if 0 <= given.drive < 2:
+            instead = ", ".join(f'"{x}"' for x in accelerations(model, given.drive_factors))
             raise SceneError(
-                f'"{one.name}": matrices take the acceleration of a drive, {instead}, for an '
-                "input, and make the rest states; frequency_response takes this one too"
+                f'"{given.name}": in matrices the input of a drive is its acceleration, '
+                f"{instead}; use that, or frequency_response, which accepts this name too"
             )
-    return found
+    return channels
 
 
 def inputs_of(model: CompiledScene) -> list[str]:
     """Inputs of the scene except those of drives, which are motions and not loads."""
     if not model.scene.input:
         return []
-    driving = {name for one in active_expressions(model.scene) if one.drive for name in one.inputs}
-    return [one.name for one in model.scene.input if one.name not in driving]
+    driving = {
+        name for active in active_expressions(model.scene) if active.drive for name in active.inputs
+    }
+    return [
+        scene_input.name for scene_input in model.scene.input if scene_input.name not in driving
+    ]
 
 
 def channel(model: CompiledScene, name: str) -> Channel:
@@ -122,21 +126,25 @@ def channel(model: CompiledScene, name: str) -> Channel:
     follow but other expressions also read.
     """
     owner, _, last = name.rpartition(".")
-    given = next((one for one in model.scene.input if one.name == name), None)
+    given = next(
+        (scene_input for scene_input in model.scene.input if scene_input.name == name), None
+    )
     if given is not None:
-        if any(one.drive and name in one.inputs for one in active_expressions(model.scene)):
-            return _following(model, given)
-        return Channel(name, given.unit, input=model.layout.inputs[name])
+        if any(
+            active.drive and name in active.inputs for active in active_expressions(model.scene)
+        ):
+            return _drive_channel(model, given)
+        return Channel(name, given.unit, input=model.coordinate_layout.inputs[name])
     if name in GROUND:
         return Channel(name, "m/s2", axis=_AXES.index(last))
     driven = motions(model)
     if name in driven:
         motion = driven[name]
-        return Channel(name, motion.unit, drive=motion.order, moves=((motion.speed, 1.0),))
+        return Channel(name, motion.unit, drive=motion.order, drive_factors=((motion.speed, 1.0),))
     ends = BodyReferences(model.scene.skeleton)
-    if last.startswith("effort") and owner in model.layout.hinges:
+    if last.startswith("effort") and owner in model.coordinate_layout.hinges:
         return _effort(model, name, owner, last)
-    springs = [one.name for one in model.scene.spring]
+    springs = [spring.name for spring in model.scene.spring]
     if last == "effort" and owner in springs:
         return Channel(name, "N", spring=springs.index(owner))
     for letter, (kind, unit) in _KINDS.items():
@@ -146,7 +154,7 @@ def channel(model: CompiledScene, name: str) -> Channel:
             if (long or last == letter + component) and end in ends:
                 own = ends.canonical(end) or end
                 return Channel(f"{end}.{kind}.{component}", unit, end=own, kind=kind, axis=axis)
-    given_names = [one.name for one in model.scene.input]
+    given_names = [scene_input.name for scene_input in model.scene.input]
     known = [
         *given_names,
         *driven,
@@ -163,36 +171,38 @@ def channel(model: CompiledScene, name: str) -> Channel:
     )
 
 
-def _following(model: CompiledScene, given: Input) -> Channel:
+def _drive_channel(model: CompiledScene, given: Input) -> Channel:
     """Channel of an input that drives follow: the motion of these drives."""
     pushing = [
-        x.what for x in active_expressions(model.scene) if given.name in x.inputs and not x.drive
+        x.description
+        for x in active_expressions(model.scene)
+        if given.name in x.inputs and not x.drive
     ]
     if pushing:
         raise SceneError(
-            f'"{given.name}": drives follow this input, and the {pushing[0]} reads it besides; '
-            "give each an input of its own"
+            f'"{given.name}": drives follow this input, and the {pushing[0]} also reads it; '
+            "use separate inputs"
         )
-    return Channel(given.name, given.unit, drive=0, moves=followers(model, given.name, 0.0))
+    return Channel(given.name, given.unit, drive=0, drive_factors=followers(model, given.name, 0.0))
 
 
 def _effort(model: CompiledScene, name: str, hinge: str, last: str) -> Channel:
-    slots = model.layout.hinges[hinge]
+    slots = model.coordinate_layout.hinges[hinge]
     names = effort_names(slots.u_names)
     if last not in names:
         raise SceneError(f'"{name}": hinge "{hinge}" has {", ".join(names) or "no speeds"}')
     k = names.index(last)
-    if slots.u + k not in model.free_speeds:
+    if slots.u + k not in model.free_speed_indices:
         raise SceneError(
-            f'"{name}": hinge "{hinge}" is driven there, so that an effort moves nothing; push '
-            "somewhere else, or take the motion of the drive for an input, such as "
+            f'"{name}": hinge "{hinge}" is driven there, so that an effort has no effect; use '
+            "another effort, or the motion of the drive as the input, such as "
             f'"{hinge}.{acceleration_name(slots.u_names[k])}"'
         )
     return Channel(name, effort_unit(slots.u_units[k]), speed=slots.u + k)
 
 
 def _efforts(model: CompiledScene) -> list[str]:
-    hinges = model.layout.hinges
+    hinges = model.coordinate_layout.hinges
     return [f"{name}.{effort}" for name in hinges for effort in effort_names(hinges[name].u_names)]
 
 
@@ -204,55 +214,55 @@ def columns(
         return np.zeros((len(free), 0))
     still, memory = np.zeros(engine.nu), engine.start_memory()
 
-    def beyond(of: LoopedEngine) -> Array:
+    def excess_efforts(of: LoopedEngine) -> Array:
         """Required efforts at rest in excess of those of the unloaded tree."""
         bare, loaded = (
             each.inverse_dynamics(state.t, state.q, still, still, memory)
-            for each in (engine.inertia_alone, of)
+            for each in (engine.inertia_only, of)
         )
         return np.asarray(loaded - bare)
 
-    found = []
-    for one in channels:
-        if one.input >= 0:
-            found.append(
-                _rate(engine, state, one.input, 0.0) - _rate(engine, state, one.input, 1.0)
+    column_list = []
+    for given in channels:
+        if given.input >= 0:
+            column_list.append(
+                _rate(engine, state, given.input, 0.0) - _rate(engine, state, given.input, 1.0)
             )
-        elif one.drive >= 0:
-            found.append(-columns_of(engine, state, one.moves).inertia)
-        elif one.speed >= 0:
-            found.append(np.eye(engine.nu)[one.speed])
-        elif one.spring >= 0:
-            found.append(-beyond(_stretched(engine, one.spring)))
-        elif one.end:
-            found.append(-beyond(_under(engine, one)))
+        elif given.drive >= 0:
+            column_list.append(-drive_columns(engine, state, given.drive_factors).inertia)
+        elif given.speed >= 0:
+            column_list.append(np.eye(engine.nu)[given.speed])
+        elif given.spring >= 0:
+            column_list.append(-excess_efforts(_with_unit_spring_effort(engine, given.spring)))
+        elif given.end:
+            column_list.append(-excess_efforts(_with_unit_load(engine, given)))
         else:
-            found.append(beyond(engine.pulled[one.axis]))
-    return np.array(found).T[free]
+            column_list.append(excess_efforts(engine.unit_gravity[given.axis]))
+    return np.array(column_list).T[free]
 
 
-def _rate(engine: LoopedEngine, state: State, place: int, rate: float) -> Array:
+def _rate(engine: LoopedEngine, state: State, index: int, rate: float) -> Array:
     """Time derivative (nu,) of the residual with constant inputs except one of the given rate."""
     system = engine.packed.system
     inputs = [
         PiecewisePolynomial(
-            (), ((state.t, one.value(state.t), rate if k == place else 0.0, 0.0, 0.0),)
+            (), ((state.t, channel_input.value(state.t), rate if k == index else 0.0, 0.0, 0.0),)
         )
-        for k, one in enumerate(system.inputs)
+        for k, channel_input in enumerate(system.inputs)
     ]
-    still = replace(system.held, places=(-1,) * len(inputs))
-    going = replace(system, inputs=tuple(inputs), held=still)
+    still = replace(system.held_inputs, memory_indices=(-1,) * len(inputs))
+    going = replace(system, inputs=tuple(inputs), held_inputs=still)
     tangent = TangentMatrix(LoopedEngine(packed_system(going, engine.packed)))
-    tangent.residual(state.t, state.q, state.u, state.a)
+    tangent.residual(state.t, state.q, state.u, state.udot)
     nothing = np.zeros(engine.nu)
     return tangent.slope(1.0, np.zeros(engine.nq), nothing, nothing)
 
 
-def _under(engine: LoopedEngine, push: Channel) -> LoopedEngine:
+def _with_unit_load(engine: LoopedEngine, push: Channel) -> LoopedEngine:
     """Engine of the tree with a unit load of the channel at an end as the only load."""
     packed = engine.packed
     body, _, offset = packed.end(push.end)
-    system = packed.system.awake(body)  # the end may have no other element
+    system = packed.system.with_active_body(body)  # the end may have no other element
     unit = np.eye(3)[push.axis].tolist()
     nothing, own = (-1, -1, -1), (0, 1, 2)
     force = push.kind == "force"
@@ -261,12 +271,12 @@ def _under(engine: LoopedEngine, push: Channel) -> LoopedEngine:
     )
     system = replace(
         system, gravity=(0.0, 0.0, 0.0), laws=(), forces=(), loads=(load,),
-        values=constant_kernel("values", system, unit), drives=None, driven=(), moving={},
+        values=constant_kernel("values", system, unit), drives=None, driven=(), seeded_numbers={},
     )  # fmt: skip
     return LoopedEngine(packed_system(system, packed))
 
 
-def _stretched(engine: LoopedEngine, number: int) -> LoopedEngine:
+def _with_unit_spring_effort(engine: LoopedEngine, number: int) -> LoopedEngine:
     """Engine of the tree with a unit effort of one spring as the only load."""
     packed, system = engine.packed, engine.packed.system
     constant = constant_kernel("effort", system, [1.0])
@@ -275,6 +285,6 @@ def _stretched(engine: LoopedEngine, number: int) -> LoopedEngine:
     )
     system = replace(
         system, gravity=(0.0, 0.0, 0.0), laws=(), forces=(spring,), loads=(), values=None,
-        drives=None, driven=(), moving={},
+        drives=None, driven=(), seeded_numbers={},
     )  # fmt: skip
     return LoopedEngine(packed_system(system, packed))

@@ -20,10 +20,10 @@ from .matrix_operators import Pencil
 #: Largest residual of a converged mode, relative to 1/(omega^2 - sigma).
 _CLOSE = 1e-9
 #: Remainder of a vector that is rounding, relative to the vector.
-_NOTHING = 1e-13
+_NEGLIGIBLE = 1e-13
 #: Steps between convergence checks, vectors per requested mode, additional vectors, largest number
 #: of runs.
-_LOOK, _VECTORS, _ROOM, _RUNS = 4, 4, 60, 30
+_CHECK_INTERVAL, _VECTORS_PER_MODE, _EXTRA_VECTORS, _MAX_RUNS = 4, 4, 60, 30
 
 
 @dataclass(frozen=True)
@@ -32,14 +32,14 @@ class ConvergedPairs:
 
     squares: Array
     shapes: Array
-    pushed: Array
+    mass_shapes: Array
 
     @classmethod
-    def none(cls, n: int) -> ConvergedPairs:
+    def empty(cls, n: int) -> ConvergedPairs:
         """Empty set of pairs for n coordinates."""
         return cls(np.zeros(0), np.zeros((n, 0)), np.zeros((0, n)))
 
-    def joined(self, squares: Array, shapes: Array, pushed: Array) -> ConvergedPairs:
+    def merge(self, squares: Array, shapes: Array, pushed: Array) -> ConvergedPairs:
         """Merge with other ascending pairs."""
         if not len(self.squares):
             return ConvergedPairs(squares, shapes, pushed)
@@ -48,14 +48,14 @@ class ConvergedPairs:
         return ConvergedPairs(
             every[order],
             np.hstack([self.shapes, shapes])[:, order],
-            np.vstack([self.pushed, pushed])[order],
+            np.vstack([self.mass_shapes, pushed])[order],
         )
 
 
 def slowest(
-    pencil: Pencil, wanted: int, sigma: float, edge: float, trial: int, known: ConvergedPairs
+    pencil: Pencil, count: int, sigma: float, edge: float, trial: int, known: ConvergedPairs
 ) -> ConvergedPairs:
-    """Known modes and `wanted` further modes with omega^2 nearest to sigma.
+    """Known modes and `count` further modes with omega^2 nearest to sigma.
 
     There are fewer if one of them already has omega^2 above `edge`.
 
@@ -63,18 +63,18 @@ def slowest(
     """
     pencil.factor(-sigma)
     start = pencil.solve(np.random.default_rng(trial).standard_normal(len(pencil)))
-    found, more = known, 0
-    for _ in range(_RUNS):
-        run = _Run(pencil, found, start)
-        run.go(wanted - more, 1 / (edge - sigma))
+    pairs, more = known, 0
+    for _ in range(_MAX_RUNS):
+        run = _Run(pencil, pairs, start)
+        run.iterate(count - more, 1 / (edge - sigma))
         squares = sigma + 1 / run.values
-        found = found.joined(squares, run.shapes, run.pushed)
+        pairs = pairs.merge(squares, run.shapes, run.mass_shapes)
         more += len(squares)
-        if more >= wanted or run.ended or (squares > edge).any():
-            return found
-        start = run.rest
+        if more >= count or run.is_exhausted or (squares > edge).any():
+            return pairs
+        start = run.next_start
     raise NumericalFailure(
-        f"modes: {more} of {wanted} motions found before the iterations were exhausted; ask for "
+        f"modes: not converged: {more} of {count} modes found within the iteration limit; request "
         "fewer"
     )
 
@@ -92,27 +92,29 @@ class _Run:
 
     def __init__(self, pencil: Pencil, known: ConvergedPairs, start: Array) -> None:
         n = len(pencil)
-        self.pencil, self.known, self.rest = pencil, known, start
+        self.pencil, self.known_pairs, self.next_start = pencil, known, start
         self.alpha: list[float] = []
         self.beta: list[float] = []
-        self.values, self.shapes, self.pushed = np.zeros(0), np.zeros((n, 0)), np.zeros((0, n))
-        self.ended = False
+        self.values, self.shapes, self.mass_shapes = np.zeros(0), np.zeros((n, 0)), np.zeros((0, n))
+        self.is_exhausted = False
 
-    def go(self, wanted: int, least: float) -> None:
-        """Iterate until `wanted` modes are found in order.
+    def iterate(self, count: int, least: float) -> None:
+        """Iterate until `count` modes are found in order.
 
         Stop early at a mode with 1/(omega^2 - sigma) below `least`, or without space for further
         vectors.
         """
         n = len(self.pencil)
-        room = min(n - len(self.known.squares), _VECTORS * wanted + _ROOM)
+        room = min(n - len(self.known_pairs.squares), _VECTORS_PER_MODE * count + _EXTRA_VECTORS)
         self.q, self.p = np.empty((room, n)), np.empty((room, n))
-        self._next(self.rest, float(np.linalg.norm(self.rest)))
-        while not self.ended:
+        self._append_vector(self.next_start, float(np.linalg.norm(self.next_start)))
+        while not self.is_exhausted:
             self._step()
             steps = len(self.alpha)
-            due = steps % _LOOK == 0 and (steps > wanted or least > 0)
-            if (due or self.ended or steps == room) and self._look(wanted, least):
+            due = steps % _CHECK_INTERVAL == 0 and (steps > count or least > 0)
+            if (due or self.is_exhausted or steps == room) and self._check_convergence(
+                count, least
+            ):
                 return
 
     def _step(self) -> None:
@@ -124,36 +126,39 @@ class _Run:
         w -= self.alpha[j] * self.q[j]
         if j:
             w -= self.beta[j - 1] * self.q[j - 1]
-        self.beta.append(self._next(w, size))
+        self.beta.append(self._append_vector(w, size))
 
-    def _next(self, w: Array, size: float) -> float:
+    def _append_vector(self, w: Array, size: float) -> float:
         """Append w, made orthogonal to all vectors; return the M-norm of the remainder.
 
         `size` is the norm of w before orthogonalisation.
         """
         j = len(self.alpha)
-        for known, pushed in ((self.known.shapes.T, self.known.pushed), (self.q[:j], self.p[:j])):
+        for known, pushed in (
+            (self.known_pairs.shapes.T, self.known_pairs.mass_shapes),
+            (self.q[:j], self.p[:j]),
+        ):
             w = w - (pushed @ w) @ known
         pushed = self.pencil.mass(w)
         square = float(w @ pushed)
-        self.ended = square <= 0 or float(np.linalg.norm(w)) <= _NOTHING * size
-        left = 0.0 if self.ended else float(np.sqrt(square))
+        self.is_exhausted = square <= 0 or float(np.linalg.norm(w)) <= _NEGLIGIBLE * size
+        left = 0.0 if self.is_exhausted else float(np.sqrt(square))
         if left and j < len(self.q):
             self.q[j], self.p[j] = w / left, pushed / left
         return left
 
-    def _look(self, wanted: int, least: float) -> bool:
+    def _check_convergence(self, count: int, least: float) -> bool:
         """Check convergence; at the end of the run store the modes found and return True."""
         steps = len(self.alpha)
         values, weights = eigh_tridiagonal(self.alpha, self.beta[:-1])
         order = np.argsort(-np.abs(values), kind="stable")
         values, weights = values[order], weights[:, order]
         close = np.abs(self.beta[-1] * weights[-1]) <= _CLOSE * np.abs(values)
-        kept = min(int(np.argmin(np.append(close, False))), wanted)
-        enough = kept == wanted or (np.abs(values[:kept]) < least).any()
-        if not enough and not self.ended and steps < len(self.q):
+        kept = min(int(np.argmin(np.append(close, False))), count)
+        enough = kept == count or (np.abs(values[:kept]) < least).any()
+        if not enough and not self.is_exhausted and steps < len(self.q):
             return False
-        self.values, found = values[:kept], weights[:, :kept]
-        self.shapes, self.pushed = self.q[:steps].T @ found, found.T @ self.p[:steps]
-        self.rest = self.q[:steps].T @ weights[:, kept:wanted].sum(axis=1)
+        self.values, vectors = values[:kept], weights[:, :kept]
+        self.shapes, self.mass_shapes = self.q[:steps].T @ vectors, vectors.T @ self.p[:steps]
+        self.next_start = self.q[:steps].T @ weights[:, kept:count].sum(axis=1)
         return True

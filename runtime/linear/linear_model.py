@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,23 +14,37 @@ from numpy.typing import ArrayLike
 from mstmm.argument_validation import abbreviate
 from mstmm.array_validation import Array
 from mstmm.errors import SceneError
+from mstmm.public_members import PublicMembers
 from mstmm.risk import Risk
 
 from ..packing.coordinate_layout import check_dense_size
 from .frequency_response import FrequencyResponse, frequency_response
 from .harmonic.dynamic_stiffness_modes import DynamicStiffnessModes, exact_modes
-from .harmonic.exact_beams import Chosen
+from .harmonic.exact_beams import BeamSelection
 from .harmonic.hysteretic_damping import Losses
 from .harmonic.modal_damping import Ratios
 from .mode_solvers import modes
 from .modes import Modes
-from .rotors.fixed_frame import carrying_at, frame_of
+from .rotors.fixed_frame import fixed_frame_transform, frame_of
 from .state_space import StateSpace
 from .validity import find_linear_risks
 
 
-class Linear(StateSpace):
+class Linear(PublicMembers, StateSpace):
     """Linear model about an operating point: matrices, modes, responses; see `LinearEquations`."""
+
+    member_groups: ClassVar[Mapping[str, str]] = {
+        "Description": "model state frame coordinate_names coordinate_units input_names "
+        "disturbance_names state_names prescribed_coordinates "
+        "free_speed_indices position_states velocity_states",
+        "Matrices": "M C K V W A B B_disturbances output_matrices C_prescribed K_prescribed "
+        "has_stiffness",
+        "Contributions": "K_elastic K_springs K_geometric K_load C_damping C_gyroscopic",
+        "Analysis": "modes dynamic_stiffness_modes frequency_response expand "
+        "displaced_state to_fixed_frame symbolic",
+        "Verdict": "trusted verdict risks warnings",
+        "Output": "plot save to_dict to_control",
+    }
 
     def modes(self, count: int | None = None, damped: bool | None = None) -> Modes:
         """Normal modes: all, or the `count` slowest.
@@ -46,7 +60,7 @@ class Linear(StateSpace):
             raise SceneError(f"damped = {abbreviate(damped)}: expected True, False or None")
         self.check_count(count, len(self))
         if count is None:
-            check_dense_size(len(self), "the matrix of all motions")
+            check_dense_size(len(self), "the matrix of all modes")
         return modes(self, count, damped)
 
     @cached_property
@@ -71,7 +85,7 @@ class Linear(StateSpace):
         """
         if self.frame == "fixed":
             return self
-        return replace(self, carrying=carrying_at(self))
+        return replace(self, frame_transform=fixed_frame_transform(self))
 
     @staticmethod
     def check_count(count: int | None, most: int) -> None:
@@ -79,11 +93,11 @@ class Linear(StateSpace):
         if count is None:
             return
         if not isinstance(count, (int, np.integer)):
-            raise SceneError(f"count = {count!r}: expected a whole number of motions")
+            raise SceneError(f"count = {count!r}: expected a whole number of modes")
         if not most:
-            raise SceneError(f"count = {count!r}: nothing moves in this scene")
+            raise SceneError(f"count = {count!r}: the scene has no degrees of freedom")
         if isinstance(count, bool) or not 0 < count <= most:
-            raise SceneError(f"count = {count!r}: expected a number of motions from 1 to {most}")
+            raise SceneError(f"count = {count!r}: expected a number of modes from 1 to {most}")
 
     def frequency_response(
         self,
@@ -93,7 +107,7 @@ class Linear(StateSpace):
         *,
         structural: Losses = 0.0,
         modal: Ratios = 0.0,
-        exact: Chosen = False,
+        exact: BeamSelection = False,
     ) -> FrequencyResponse:
         """Frequency response at angular frequencies omega (k,) in rad/s, O(bodies) per frequency.
 
@@ -120,7 +134,9 @@ class Linear(StateSpace):
         """
         return frequency_response(self, omega, inputs, outputs, structural, modal, exact)
 
-    def exact_modes(self, count: int, exact: Chosen = True) -> DynamicStiffnessModes:
+    def dynamic_stiffness_modes(
+        self, count: int, exact: BeamSelection = True
+    ) -> DynamicStiffnessModes:
         """The `count` slowest undamped modes with exact beams.
 
         `exact` is as in `frequency_response`.  Modes are found by counting, so that none is missed.
@@ -142,7 +158,7 @@ class Linear(StateSpace):
         """
         from .python_control import output_matrices
 
-        return output_matrices(self, outputs, self.controls, self.B)[1:]
+        return output_matrices(self, outputs, self.input_channels, self.B)[1:]
 
     def to_control(self, outputs: Sequence[str] | None = None, disturbances: bool = False) -> Any:
         """Model as a `control.StateSpace` of python-control (extra control).

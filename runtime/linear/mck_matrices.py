@@ -31,7 +31,7 @@ class State:
     t: float
     q: Array
     u: Array
-    a: Array
+    udot: Array
 
 
 @dataclass(frozen=True)
@@ -45,14 +45,15 @@ class Matrices:
 
 def matrices(engine: LoopedEngine, state: State, free: Sequence[int]) -> Matrices:
     """Matrices of a packed scene; NumericalFailure if the state cannot be evaluated."""
-    found = thread_tangent(engine).matrices(state.t, state.q, state.u, state.a, free)
-    if not np.isfinite(found).all():
+    values = thread_tangent(engine).matrices(state.t, state.q, state.u, state.udot, free)
+    if not np.isfinite(values).all():
         raise _no_slope(engine, state)
-    return Matrices(*found)
+    return Matrices(*values)
 
 
 def _no_slope(engine: LoopedEngine, state: State) -> NumericalFailure:
     cause = find_nonfinite_derivative(engine, state.t, state.q, state.u)
     return NumericalFailure(
-        f"the scene is not linear near this state: {cause or 'a slope of its efforts is no number'}"
+        "the scene cannot be linearised at this state: "
+        f"{cause or 'a derivative of its efforts is not finite'}"
     )

@@ -25,33 +25,35 @@ from .frozen_loads import with_springs_grounded
 from .matrix_operators import Pencil
 
 #: Upper bound of the rank of the stiffness of one spring between two bodies.
-_WAYS = 12
+_SPRING_RANK = 12
 #: Relative size below which a column is linearly dependent, and relative asymmetry above which a
 #: matrix does not count as symmetric.
 _NEW, _SYMMETRIC = 1e-12, 1e-6
 
 
-class Counting:
+class ModeCounter:
     """Counter of the modes of one scene."""
 
     def __init__(self, pencil: Pencil) -> None:
-        self.whole = self.tree = pencil
-        if pencil.tangent.coupled:
+        self.full_pencil = self.tree = pencil
+        if pencil.tangent.off_tree_count:
             apart = with_springs_grounded(pencil.tangent.engine, pencil.state)
             self.tree = Pencil(apart, pencil.state, pencil.free.tolist())
 
-    def below(self, square: float) -> int | None:
+    def count_below(self, square: float) -> int | None:
         """Number of omega^2 below `square`.
 
         None if loads other than springs couple branches of the tree, or have no potential.
         """
         efforts = self._efforts
         self.tree.factor(-square)
-        found = self.tree.tangent.count_negative()
-        if found is None or not efforts.size:
-            return found
-        more = self._more(square, _basis([self.tree.solve(column) for column in efforts.T]))
-        return None if more is None else found + more
+        count = self.tree.tangent.count_negative()
+        if count is None or not efforts.size:
+            return count
+        more = self._count_difference(
+            square, _basis([self.tree.solve(column) for column in efforts.T])
+        )
+        return None if more is None else count + more
 
     @cached_property
     def _efforts(self) -> Array:
@@ -59,23 +61,23 @@ class Counting:
 
         It is found from random displacements, as many as the rank of the coupling can be.
         """
-        n = len(self.whole)
-        if self.tree is self.whole:
+        n = len(self.full_pencil)
+        if self.tree is self.full_pencil:
             return np.zeros((n, 0))
         forces = len(self.tree.tangent.engine.packed.system.forces)
-        moves = np.random.default_rng(0).standard_normal((min(n, _WAYS * forces), n))
-        return _basis([self.whole.stiffness(x) - self.tree.stiffness(x) for x in moves])
+        moves = np.random.default_rng(0).standard_normal((min(n, _SPRING_RANK * forces), n))
+        return _basis([self.full_pencil.stiffness(x) - self.tree.stiffness(x) for x in moves])
 
-    def _more(self, square: float, w: Array) -> int | None:
+    def _count_difference(self, square: float, w: Array) -> int | None:
         """Number of negative eigenvalues of A less that of T; None if either is not symmetric."""
-        found = []
-        for pencil in (self.whole, self.tree):
+        counts = []
+        for pencil in (self.full_pencil, self.tree):
             pressed = [pencil.stiffness(x) - square * pencil.mass(x) for x in w.T]
             matrix = w.T @ np.array(pressed).T
             if np.abs(matrix - matrix.T).max() > _SYMMETRIC * np.abs(matrix).max():
                 return None
-            found.append(int((np.linalg.eigvalsh((matrix + matrix.T) / 2) < 0).sum()))
-        return found[0] - found[1]
+            counts.append(int((np.linalg.eigvalsh((matrix + matrix.T) / 2) < 0).sum()))
+        return counts[0] - counts[1]
 
 
 def _basis(columns: list[Array]) -> Array:

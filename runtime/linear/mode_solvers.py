@@ -27,35 +27,35 @@ _ROUNDING = 1e-7
 def modes(linear: LinearEquations, count: int | None, damped: bool | None) -> Modes:
     """Modes of a linear model; see `Linear.modes`."""
     few = count is not None and len(linear) > _DENSE and 4 * count <= len(linear)
-    few = few and linear.mechanism is None and linear.carrying is None
-    if count is None or not few or linear.turning is not None:
-        found = _dense(linear, damped)
-        return found if count is None else replace(found.first(count), count=count)
-    return replace(_few(linear, count, damped), count=count)
+    few = few and linear.constrained_motion is None and linear.frame_transform is None
+    if count is None or not few or linear.rate_matrix is not None:
+        dense_modes = _dense(linear, damped)
+        return dense_modes if count is None else replace(dense_modes.lowest(count), count=count)
+    return replace(_lowest_modes(linear, count, damped), count=count)
 
 
-def _few(linear: LinearEquations, count: int, damped: bool | None) -> Modes:
+def _lowest_modes(linear: LinearEquations, count: int, damped: bool | None) -> Modes:
     from . import shift_invert_modes
 
-    pencil = linear.pencil
+    pencil = linear.operators
     x = np.random.default_rng(0).standard_normal(len(linear))
     with_c = bool(pencil.damping(x).any()) if damped is None else damped
     if with_c or pencil.skew() > _SYMMETRIC:
         slowest = shift_invert_modes.damped_modes(pencil, count, with_c)
         return Modes(linear, slowest.values, slowest.shapes, None)
     slowest = shift_invert_modes.undamped_modes(pencil, count)
-    return _ordered(linear, slowest.values, slowest.shapes, slowest.complete)
+    return _modes_from_squares(linear, slowest.values, slowest.shapes, slowest.is_complete)
 
 
 def _dense(linear: LinearEquations, damped: bool | None) -> Modes:
     """All modes, from the matrices."""
     with_c = linear.C.any() if damped is None else damped
-    if with_c or not _from_potential(linear.K):
+    if with_c or not _is_symmetric(linear.K):
         return _general(linear, linear.C if with_c else np.zeros_like(linear.C))
-    return _ordered(linear, *_symmetric(linear), True)
+    return _modes_from_squares(linear, *_symmetric(linear), True)
 
 
-def _ordered(
+def _modes_from_squares(
     linear: LinearEquations, squares: Array, shapes: Array, complete: bool | None
 ) -> Modes:
     """Modes from omega^2; a negative value gives the growing one of its two motions."""
@@ -65,7 +65,7 @@ def _ordered(
     return Modes(linear, values[order], shapes[:, order], complete)
 
 
-def _from_potential(stiffness: Array) -> bool:
+def _is_symmetric(stiffness: Array) -> bool:
     scale = np.abs(stiffness).max(initial=0)
     return bool(np.abs(stiffness - stiffness.T).max(initial=0) <= _SYMMETRIC * scale)
 
@@ -83,9 +83,9 @@ def _symmetric(linear: LinearEquations) -> tuple[Array, Array]:
 def _general(linear: LinearEquations, c: Array) -> Modes:
     """Modes of the quadratic eigenvalue problem, reduced to first order."""
     n = len(linear)
-    zero, one = np.zeros((n, n)), np.eye(n)
-    a = np.block([[zero, one], [-linear.K, -c]])
-    b = np.block([[one, zero], [zero, linear.M]])
+    zero, identity = np.zeros((n, n)), np.eye(n)
+    a = np.block([[zero, identity], [-linear.K, -c]])
+    b = np.block([[identity, zero], [zero, linear.M]])
     pairs: Any = eig(a, b)
     values, vectors = pairs
     if not np.isfinite(values).all():
@@ -96,14 +96,14 @@ def _general(linear: LinearEquations, c: Array) -> Modes:
     kept = np.flatnonzero(np.imag(values) >= 0)
     kept = kept[np.argsort(np.abs(values[kept]), kind="stable")]
     shapes = vectors[:n, kept]
-    places = np.abs(shapes).argmax(axis=0)
-    shapes = shapes / shapes[places, np.arange(len(kept))]
+    largest_rows = np.abs(shapes).argmax(axis=0)
+    shapes = shapes / shapes[largest_rows, np.arange(len(kept))]
     return Modes(linear, values[kept].astype(np.complex128), shapes, True)
 
 
 def _no_inertia(linear: LinearEquations) -> NumericalFailure:
-    names = ", ".join(linear.coordinates[:3])
+    names = ", ".join(linear.coordinate_names[:3])
     return NumericalFailure(
-        f"modes: the mass matrix of {names}, ... is not positive, so that some motion has no "
-        "frequency; give what these move inertia"
+        f"modes: the mass matrix of {names}, ... is not positive definite, so that a mode has "
+        "no frequency; give the bodies that they move inertia"
     )

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mstmm.array_validation import Array, finite_float
 from mstmm.errors import SceneError
-from mstmm.risk import AssessedAnswer, Risk, information
+from mstmm.public_members import PublicMembers
+from mstmm.risk import AssessedResult, Risk, information
 from mstmm.safe_text import abbreviate_names
 
 from ..engine.characteristic_scales import scene_length
@@ -36,7 +37,7 @@ Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, eq=False)
-class Modes(AssessedAnswer):
+class Modes(PublicMembers, AssessedResult):
     """k modes x(t) = Re(shape exp(eigenvalue t)) about an operating point, by ascending omega.
 
     Attributes:
@@ -44,14 +45,23 @@ class Modes(AssessedAnswer):
         eigenvalues: (k,) complex, 1/s; of a conjugate pair the one with positive imaginary part.
         shapes: (n, k), real with unit modal mass without damping and gyroscopic terms, else complex
             with the largest entry 1.
-        complete: whether no mode below the last one is missing; None if not counted.
+        is_complete: whether no mode below the last one is missing; None if not counted.
         count: requested number of modes; None for all.
     """
+
+    member_groups: ClassVar[Mapping[str, str]] = {
+        "Modes": "eigenvalues omega frequency damping_ratio shapes whirl unstable "
+        "is_undamped is_complete count frame linear lowest",
+        "Participation": "dominant_coordinates kinetic_energy_shares strain_energy_shares "
+        "participation_factors effective_modal_mass displaced_state",
+        "Verdict": "trusted verdict risks warnings",
+        "Output": "plot plot_eigenvalues view save to_xarray to_dict",
+    }
 
     linear: LinearEquations = field(repr=False)
     eigenvalues: Complex
     shapes: NDArray[Any] = field(repr=False)
-    complete: bool | None
+    is_complete: bool | None
     count: int | None = field(default=None, repr=False, kw_only=True)
 
     def __repr__(self) -> str:
@@ -86,29 +96,34 @@ class Modes(AssessedAnswer):
             first = np.flatnonzero(self.omega > 0)[:1]
             is_objection = self.count is not None or any(self._range_risks_of(first))
             for risk in self._range_risks_of(fast):
-                yield replace(risk, doubt=is_objection)
+                yield replace(risk, invalidates=is_objection)
 
-    def _range_risks_of(self, places: NDArray[np.intp]) -> Iterator[Risk]:
-        some = replace(self, eigenvalues=self.eigenvalues[places], shapes=self.shapes[:, places])
-        return motion_range_risks(self.linear.model, some.omega, some.strain())
+    def _range_risks_of(self, mode_indices: NDArray[np.intp]) -> Iterator[Risk]:
+        some = replace(
+            self, eigenvalues=self.eigenvalues[mode_indices], shapes=self.shapes[:, mode_indices]
+        )
+        return motion_range_risks(self.linear.model, some.omega, some.strain_energy_shares())
 
     def motion_risks(self) -> Iterator[Risk]:
         """Risks of unstable and unrestrained modes."""
         growing = self.eigenvalues.real.max(initial=0)
         if growing > 0:
             k = int(self.eigenvalues.real.argmax())
-            moving = abbreviate_names(self.moving(k))
+            moving = abbreviate_names(self.dominant_coordinates(k))
             yield information(
-                "unstable", moving, f"unstable: a motion of {moving} grows with {growing:.4g} 1/s",
-                "small motions leave this state; choose a stable one",
+                "unstable", moving,
+                f"unstable: a motion of {moving} grows at a rate of {growing:.4g} 1/s",
+                "linearise about a stable state",
             )  # fmt: skip
         free = np.flatnonzero(self.omega == 0)
         if len(free):
-            moved = list(dict.fromkeys(name for k in free for name in self.moving(int(k))))
+            moved = list(
+                dict.fromkeys(name for k in free for name in self.dominant_coordinates(int(k)))
+            )
             yield information(
                 "unrestrained", abbreviate_names(moved),
-                f"nothing pushes back {abbreviate_names(moved)}: motions of frequency 0",
-                "add a stiffness if they are not meant to move freely",
+                f"no stiffness acts on {abbreviate_names(moved)}: modes of frequency 0",
+                "add a stiffness, unless they are meant to move freely",
             )  # fmt: skip
 
     @cached_property
@@ -135,13 +150,13 @@ class Modes(AssessedAnswer):
         return np.abs(self.eigenvalues.imag) / (2 * np.pi)
 
     @property
-    def damping(self) -> Array:
+    def damping_ratio(self) -> Array:
         """Damping ratio (k,); negative for unstable modes, 0 where omega is 0."""
         omega = self.omega
         rates = 0.0 - self.eigenvalues.real
         return np.divide(rates, omega, out=np.zeros_like(omega), where=omega > 0)
 
-    def first(self, count: int) -> Modes:
+    def lowest(self, count: int) -> Modes:
         """The first `count` modes."""
         return replace(self, eigenvalues=self.eigenvalues[:count], shapes=self.shapes[:, :count])
 
@@ -149,18 +164,18 @@ class Modes(AssessedAnswer):
     def _units(self) -> Array:
         """Modal masses (k,), x* M x, of the shapes."""
         linear, x = self.linear, self.shapes
-        loops = linear.mechanism is not None
-        moved = linear.M @ x if loops else energy_shares.along(linear.pencil.mass, x)
+        loops = linear.constrained_motion is not None
+        moved = linear.M @ x if loops else energy_shares.operator_products(linear.operators.mass, x)
         return np.real(np.einsum("ik,ik->k", np.conj(self.shapes), moved))
 
     @cached_property
     def _lengths(self) -> Array:
         """Weights (n,) to compare coordinates: 1 for m, the scene length for rad."""
-        turns = [unit == "rad" for unit in self.linear.units]
+        turns = [unit == "rad" for unit in self.linear.coordinate_units]
         return np.where(turns, scene_length(self.linear.model), 1.0)
 
     @cached_property
-    def participation(self) -> NDArray[Any]:
+    def participation_factors(self) -> NDArray[Any]:
         """Modal excitation (k, disturbances) per unit of each disturbance: x* W / modal mass.
 
         For accelerations of the ground these are the participation factors with opposite sign.
@@ -169,71 +184,78 @@ class Modes(AssessedAnswer):
         return np.asarray(pushed / self._units[:, None])
 
     @property
-    def effective_mass(self) -> Array:
+    def effective_modal_mass(self) -> Array:
         """Effective modal mass (k, disturbances): |x* W|^2 / modal mass.
 
         It is in kg for accelerations of the ground; the sum over all undamped modes of a scene is
         the moving mass.
         """
-        return np.asarray(np.abs(self.participation) ** 2 * self._units[:, None])
+        return np.asarray(np.abs(self.participation_factors) ** 2 * self._units[:, None])
 
-    def kinetic(self) -> dict[str, Array]:
+    def kinetic_energy_shares(self) -> dict[str, Array]:
         """Share (k,) of each body in the kinetic energy x* M x of each shape.
 
         The rotors of a hinge count with its outboard body.
         """
         return energy_shares.kinetic(self.linear, self.shapes)
 
-    def strain(self) -> dict[str, Array]:
+    def strain_energy_shares(self) -> dict[str, Array]:
         """Share (k,) of each owner in the elastic energy of each shape.
 
         Owners are hinges with laws, flexible bodies, and "springs" for all springs together, if
         there are any.  nan for a shape without elastic energy.
         """
-        return energy_shares.strain(self.linear, self.shapes)
+        return energy_shares.strain_shares(self.linear, self.shapes)
 
-    def displaced(self, k: int, amplitude: float) -> Array:
+    def displaced_state(self, k: int, amplitude: float) -> Array:
         """Coordinates q (nq,) of the state displaced by `amplitude` times Re(shape k)."""
-        return self.linear.displaced(finite_float("amplitude", amplitude) * np.real(self._shape(k)))
+        return self.linear.displaced_state(
+            finite_float("amplitude", amplitude) * np.real(self._shape(k))
+        )
 
     def _shape(self, k: int) -> NDArray[Any]:
         if isinstance(k, bool) or not isinstance(k, (int, np.integer)) or not 0 <= k < len(self):
-            raise SceneError(f"shape {k!r}: there are {len(self)}, counted from 0")
+            raise SceneError(f"shape {k!r}: expected the index of one of {len(self)} modes, from 0")
         return self.shapes[:, k]
 
-    def moving(self, k: int) -> list[str]:
+    def dominant_coordinates(self, k: int) -> list[str]:
         """Dominant coordinates of mode k: at least a tenth of the largest, largest first.
 
         A radian counts as one length of the scene.
         """
         size = np.abs(self._shape(k)) * self._lengths
-        places = np.flatnonzero(size > 0.1 * size.max(initial=0))
-        order = places[np.argsort(-size[places], kind="stable")]
-        return [self.linear.coordinates[j] for j in order]
+        large_entries = np.flatnonzero(size > 0.1 * size.max(initial=0))
+        order = large_entries[np.argsort(-size[large_entries], kind="stable")]
+        return [self.linear.coordinate_names[j] for j in order]
 
     def to_dict(self) -> dict[str, Any]:
         """All data as a dictionary for JSON; one row per shape."""
         return {
             "omega": self.omega.tolist(), "frequency": self.frequency.tolist(),
-            "damping": self.damping.tolist(), "complete": self.complete,
+            "damping": self.damping_ratio.tolist(), "complete": self.is_complete,
             "frame": self.frame, "whirl": self.whirl.tolist(),
             "eigenvalues": [[x.real, x.imag] for x in self.eigenvalues.tolist()],
-            "coordinates": list(self.linear.coordinates), "units": list(self.linear.units),
-            "shapes": {"real": np.real(self.shapes).T.tolist(),
-                       "imag": np.imag(self.shapes).T.tolist()},
-            "kinetic": {name: row.tolist() for name, row in self.kinetic().items()},
-            "strain": {name: [None if np.isnan(x) else x for x in row.tolist()]
-                       for name, row in self.strain().items()},
+            "coordinates": list(self.linear.coordinate_names),
+            "units": list(self.linear.coordinate_units),
+            "shapes": {
+                "real": np.real(self.shapes).T.tolist(),
+                "imag": np.imag(self.shapes).T.tolist(),
+            },
+            "kinetic": {name: row.tolist() for name, row in self.kinetic_energy_shares().items()},
+            "strain": {
+                name: [None if np.isnan(x) else x for x in row.tolist()]
+                for name, row in self.strain_energy_shares().items()
+            },
             **self.assessment(),
         }  # fmt: skip
 
-    def to_dataset(self) -> Any:
+    def to_xarray(self) -> Any:
         """`xarray.Dataset` with real and imaginary parts; EnvironmentFailure without the extra."""
-        kinetic, strain = self.kinetic(), self.strain()
+        kinetic, strain = self.kinetic_energy_shares(), self.strain_energy_shares()
         arrays: dict[str, Any] = {
             "omega": ("mode", self.omega, {"units": "rad/s"}),
             "frequency": ("mode", self.frequency, {"units": "Hz"}),
-            "damping": ("mode", self.damping),
+            "damping": ("mode", self.damping_ratio),
             "growth": ("mode", self.eigenvalues.real, {"units": "1/s"}),
             "whirl": ("mode", self.whirl),
             "shape": (("coordinate", "mode"), np.real(self.shapes)),
@@ -242,21 +264,24 @@ class Modes(AssessedAnswer):
             "strain": (("owner", "mode"), np.array(list(strain.values()))),
         }
         names = {
-            "mode": np.arange(1, len(self) + 1), "coordinate": list(self.linear.coordinates),
+            "mode": np.arange(1, len(self) + 1), "coordinate": list(self.linear.coordinate_names),
             "body": list(kinetic), "owner": list(strain),
         }  # fmt: skip
-        about = {"complete": str(self.complete), "frame": self.frame}
+        about = {"complete": str(self.is_complete), "frame": self.frame}
         return file_formats.xarray().Dataset(arrays, names, about)
 
     def _rows(self) -> Iterator[tuple[str, ...]]:
         """Header, then one row per mode."""
-        parts = [np.real] if self.undamped else [np.real, np.imag]
+        parts = [np.real] if self.is_undamped else [np.real, np.imag]
         named = [name + " imaginary" * (part is np.imag) for part in parts
-                 for name in self.linear.coordinates]  # fmt: skip
-        whose = ("kinetic energy", self.kinetic()), ("strain energy", self.strain())
+                 for name in self.linear.coordinate_names]  # fmt: skip
+        whose = (
+            ("kinetic energy", self.kinetic_energy_shares()),
+            ("strain energy", self.strain_energy_shares()),
+        )
         shared = [f"{kind} of {name}" for kind, part in whose for name in part]
         yield "mode", "omega [rad/s]", "frequency [Hz]", "damping", "growth [1/s]", *named, *shared
-        about = self.omega, self.frequency, self.damping, self.eigenvalues.real
+        about = self.omega, self.frequency, self.damping_ratio, self.eigenvalues.real
         for k, shape in enumerate(self.shapes.T):
             numbers = [*(x[k] for x in about), *(x for part in parts for x in part(shape)),
                        *(row[k] for _, part in whose for row in part.values())]  # fmt: skip
@@ -269,7 +294,7 @@ class Modes(AssessedAnswer):
 
         Raises SceneError for another file extension, EnvironmentFailure without the extra.
         """
-        return file_formats.save(path, self.to_dataset, self._rows())
+        return file_formats.save(path, self.to_xarray, self._rows())
 
     def plot(self, path: str | Path | None = None, which: Sequence[int] | None = None) -> Any:
         """Mode shapes as a `matplotlib.figure.Figure`, written to `path` if given.
@@ -282,10 +307,10 @@ class Modes(AssessedAnswer):
         """
         from .plots.mode_shapes import shapes
 
-        which = self._which(which)
+        which = self._shape_indices(which)
         return shapes(self.linear, self.eigenvalues, self.shapes, which, path)
 
-    def _which(self, which: Sequence[int] | None) -> Sequence[int]:
+    def _shape_indices(self, which: Sequence[int] | None) -> Sequence[int]:
         """Indices of the requested shapes, by default the first; SceneError for an unknown one."""
         if which is None:
             return range(min(_PANELS, len(self)))
@@ -303,7 +328,7 @@ class Modes(AssessedAnswer):
         *,
         which: Sequence[int] | None = None,
         amplitude: float | None = None,
-        title: str = "Natural motions",
+        title: str = "Normal modes",
     ) -> SceneView:
         """Animated mode shapes on one page, written to `path` if given; see `Result.view`.
 
@@ -316,14 +341,14 @@ class Modes(AssessedAnswer):
         from .plots.mode_animation import view
 
         if amplitude is not None and not 0 < finite_float("amplitude", amplitude) <= 1:
-            raise SceneError(f"amplitude = {amplitude:g}: expected a part of the size, 0 to 1")
+            raise SceneError(f"amplitude = {amplitude:g}: expected a fraction of the size, 0 to 1")
         if which is None:
             which = np.flatnonzero(self.omega > 0)[:_PANELS].tolist() or None
-        which = self._which(which)
-        made = view(self.linear, self.eigenvalues, self.shapes, which, amplitude, title)
+        which = self._shape_indices(which)
+        animation = view(self.linear, self.eigenvalues, self.shapes, which, amplitude, title)
         if path is not None:
-            made.save(path)
-        return made
+            animation.save(path)
+        return animation
 
     def plot_eigenvalues(self, path: str | Path | None = None) -> Any:
         """Eigenvalue plot as a `matplotlib.figure.Figure`, written to `path` if given.
@@ -338,11 +363,11 @@ class Modes(AssessedAnswer):
         return eigenvalues(self.eigenvalues, path)
 
     @property
-    def growing(self) -> NDArray[np.bool_]:
+    def unstable(self) -> NDArray[np.bool_]:
         """Mask (k,) of unstable modes."""
         return self.eigenvalues.real > 0
 
     @property
-    def undamped(self) -> bool:
+    def is_undamped(self) -> bool:
         """Whether the modes have neither damping nor gyroscopic terms."""
         return not np.iscomplexobj(self.shapes)

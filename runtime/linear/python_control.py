@@ -11,7 +11,7 @@ from mstmm.array_validation import Array
 from mstmm.errors import SceneError
 from mstmm.optional_packages import missing_package_error
 
-from .harmonic.steady_states import refuse_turning_outputs
+from .harmonic.steady_states import check_steady_outputs
 from .input_channels import Channel, some_names
 from .outputs.linear_outputs import outputs_of, rows_of
 from .state_space import StateSpace
@@ -26,9 +26,9 @@ def output_matrices(
     """
     named = None if outputs is None else some_names("outputs", outputs)
     shown = outputs_of(linear, named)
-    refuse_turning_outputs(linear, shown)
-    c, d = linear.observed(rows_of(linear, shown, pushes), b)
-    return tuple(one.name for one in shown), c, d
+    check_steady_outputs(linear, shown)
+    c, d = linear.state_output_matrices(rows_of(linear, shown, pushes), b)
+    return tuple(quantity.name for quantity in shown), c, d
 
 
 def to_control(linear: StateSpace, outputs: Sequence[str] | None, disturbances: bool) -> Any:
@@ -37,17 +37,17 @@ def to_control(linear: StateSpace, outputs: Sequence[str] | None, disturbances: 
         import control
     except ImportError as error:
         raise missing_package_error("control", "a system for python-control", error) from None
-    b, pushes = linear.B, linear.controls
+    b, pushes = linear.B, linear.input_channels
     if disturbances:
-        b, pushes = np.hstack([b, linear.B_disturbances]), (*pushes, *linear.others)
+        b, pushes = np.hstack([b, linear.B_disturbances]), (*pushes, *linear.disturbance_channels)
     if not pushes:
         raise SceneError(
-            'the model has no inputs: name some, as in linearize(inputs=["shoulder.effort"])'
+            'the model has no inputs; give inputs, as in linearize(inputs=["shoulder.effort"])'
         )
     names, c, d = output_matrices(linear, outputs, pushes, b)
     return control.ss(
-        linear.A, b, c, d, states=list(map(_signal, linear.states)),
-        inputs=[_signal(one.name) for one in pushes], outputs=list(map(_signal, names)),
+        linear.A, b, c, d, states=list(map(_signal, linear.state_names)),
+        inputs=[_signal(entry.name) for entry in pushes], outputs=list(map(_signal, names)),
     )  # fmt: skip
 
 

@@ -22,7 +22,7 @@ from mstmm.errors import NumericalFailure
 
 from .lanczos_iteration import ConvergedPairs, slowest
 from .matrix_operators import Pencil
-from .mode_count import Counting
+from .mode_count import ModeCounter
 
 #: Additional modes, so that the count finds a gap above the last requested one.
 _BEYOND = 2
@@ -44,35 +44,35 @@ _GAP = 1e-9
 class LowestModes:
     """Slowest modes: omega^2 or eigenvalues (k,) and shapes (n, k).
 
-    `complete` says whether no mode below the last one is missing; None if not counted.
+    `is_complete` says whether no mode below the last one is missing; None if not counted.
     """
 
     values: NDArray[Any]
     shapes: NDArray[Any]
-    complete: bool | None
+    is_complete: bool | None
 
 
 def undamped_modes(pencil: Pencil, count: int) -> LowestModes:
-    """The `count` modes of smallest omega^2 of M and a symmetric K."""
-    n, counting = len(pencil), Counting(pencil)
-    wanted, sigma = min(count + _BEYOND, n - 1), _shift(pencil, counting)
-    found, edge, values = ConvergedPairs.none(n), np.inf, np.zeros(0)
+    """The `count` modes of smallest omega^2 of M and a symmetric K; says if one is missing."""
+    n, counting = len(pencil), ModeCounter(pencil)
+    mode_count, sigma = min(count + _BEYOND, n - 1), _shift(pencil, counting)
+    pairs, edge, values = ConvergedPairs.empty(n), np.inf, np.zeros(0)
     for trial in range(_TRIALS):
-        found = slowest(pencil, wanted, sigma, edge, trial, found)
-        values = np.where(np.abs(found.squares) <= _ROUNDING * abs(sigma), 0.0, found.squares)
-        kept, edge = _gap(values, count)
-        counted = counting.below(edge)
+        pairs = slowest(pencil, mode_count, sigma, edge, trial, pairs)
+        values = np.where(np.abs(pairs.squares) <= _ROUNDING * abs(sigma), 0.0, pairs.squares)
+        kept, edge = _spectral_gap(values, count)
+        counted = counting.count_below(edge)
         if counted is None or counted == kept:
             complete = None if counted is None else True
-            return LowestModes(values[:count], found.shapes[:, :count], complete)
-        wanted = counted - kept
+            return LowestModes(values[:count], pairs.shapes[:, :count], complete)
+        mode_count = counted - kept
         if counted < kept:  # spurious modes were found: repeat with a shift that separates them
-            found, sigma = ConvergedPairs.none(n), min(sigma, edge - abs(edge))
-            wanted, edge = min(count + _BEYOND, n - 1), np.inf
-    return LowestModes(values[:count], found.shapes[:, :count], False)
+            pairs, sigma = ConvergedPairs.empty(n), min(sigma, edge - abs(edge))
+            mode_count, edge = min(count + _BEYOND, n - 1), np.inf
+    return LowestModes(values[:count], pairs.shapes[:, :count], False)
 
 
-def _gap(values: Array, count: int) -> tuple[int, float]:
+def _spectral_gap(values: Array, count: int) -> tuple[int, float]:
     """Number of values below the first gap at or after the last requested one, and its centre."""
     for k in range(max(1, min(count, len(values) - 1)), len(values)):
         below, above = float(values[k - 1]), float(values[k])
@@ -82,24 +82,24 @@ def _gap(values: Array, count: int) -> tuple[int, float]:
     return len(values), last + _GAP * abs(last)
 
 
-def _shift(pencil: Pencil, counting: Counting) -> float:
+def _shift(pencil: Pencil, counting: ModeCounter) -> float:
     """Shift sigma: 0 if the scene is restrained, else negative.
 
     Its magnitude suffices for a usable factorisation, and is as large as possible below the omega^2
     of all restrained modes.
     """
-    if _told(pencil, 0.0):
+    if _is_usable(pencil, 0.0):
         return 0.0
     shifts = (np.array(_SHIFTS) * _fastest(pencil)).tolist()
-    first = next((k for k in range(0, len(shifts), 4) if _told(pencil, shifts[k])), _UNCOUNTED)
-    still = counting.below(shifts[first])
+    first = next((k for k in range(0, len(shifts), 4) if _is_usable(pencil, shifts[k])), _UNCOUNTED)
+    still = counting.count_below(shifts[first])
     if still is None:
         return -shifts[_UNCOUNTED]
-    more = bisect_left(shifts, True, first, key=lambda shift: counting.below(shift) != still)
+    more = bisect_left(shifts, True, first, key=lambda shift: counting.count_below(shift) != still)
     return -shifts[max(first, more - 1)]
 
 
-def _told(pencil: Pencil, shift: float) -> bool:
+def _is_usable(pencil: Pencil, shift: float) -> bool:
     """Whether the factorisation of K + shift M is usable: its solution has a small residual."""
     try:
         pencil.factor(shift)
@@ -142,13 +142,13 @@ def damped_modes(pencil: Pencil, count: int, with_c: bool) -> LowestModes:
     k = min(2 * count + 4 * _BEYOND, 2 * n - 2)
     start = np.random.default_rng(0).standard_normal(2 * n)
     try:
-        found: Any = eigs(operator, k=k, v0=start, ncv=min(2 * n, 2 * k + 20))
+        eigenpairs: Any = eigs(operator, k=k, v0=start, ncv=min(2 * n, 2 * k + 20))
     except ArpackError as error:
         raise NumericalFailure(f"modes: the iteration broke down ({error})") from None
-    inverses, vectors = found
+    inverses, vectors = eigenpairs
     values = sigma + 1 / inverses
     kept = np.flatnonzero(values.imag >= -1e-9 * np.abs(values))
     kept = kept[np.argsort(np.abs(values[kept]), kind="stable")][:count]
     shapes = vectors[:n, kept]
-    places = np.abs(shapes).argmax(axis=0)
-    return LowestModes(values[kept], shapes / shapes[places, np.arange(len(kept))], None)
+    largest_rows = np.abs(shapes).argmax(axis=0)
+    return LowestModes(values[kept], shapes / shapes[largest_rows, np.arange(len(kept))], None)

@@ -21,43 +21,45 @@ class StateSpace(LinearEquations):
     """
 
     @property
-    def states(self) -> tuple[str, ...]:
+    def state_names(self) -> tuple[str, ...]:
         """Names of the states (x, x') or (x, x', d, d')."""
-        parts = self.coordinates, self.driven
+        parts = self.coordinate_names, self.prescribed_coordinates
         return tuple(f"{name}{rate}" for names in parts for rate in ("", "'") for name in names)
 
     @property
-    def positions(self) -> list[int]:
+    def position_states(self) -> list[int]:
         """Indices of x and d in the state."""
-        n, k = len(self), len(self.drives)
+        n, k = len(self), len(self.drive_indices)
         return [*range(n), *range(2 * n, 2 * n + k)]
 
     @property
-    def velocities(self) -> list[int]:
+    def velocity_states(self) -> list[int]:
         """Indices of x' and d' in the state."""
-        n, k = len(self), len(self.drives)
+        n, k = len(self), len(self.drive_indices)
         return [*range(n, 2 * n), *range(2 * n + k, 2 * n + 2 * k)]
 
     @cached_property
     def A(self) -> Array:
         """System matrix (2 n + 2 k, 2 n + 2 k) with k drives."""
-        if not self.drives:
+        if not self.drive_indices:
             return self._undriven
-        found = np.zeros((len(self.states), len(self.states)))
-        found[self.positions, self.velocities] = 1.0
+        matrix = np.zeros((len(self.state_names), len(self.state_names)))
+        matrix[self.position_states, self.velocity_states] = 1.0
         n = len(self)
-        found[: 2 * n, : 2 * n] = self._undriven
-        both = np.hstack([self.K_driven, self.C_driven])
-        found[n : 2 * n, 2 * n :] = -np.linalg.solve(self.M, both)
-        return found
+        matrix[: 2 * n, : 2 * n] = self._undriven
+        both = np.hstack([self.K_prescribed, self.C_prescribed])
+        matrix[n : 2 * n, 2 * n :] = -np.linalg.solve(self.M, both)
+        return matrix
 
     @property
     def _undriven(self) -> Array:
         """System matrix (2 n, 2 n) of (x, x') without motion of drives."""
-        if self.about is not None and self.carrying is None:
-            found = self.model.slopes.state_matrix(self.about, self.turning is not None)
-            if found is not None:
-                return found
+        if self.compiled_state is not None and self.frame_transform is None:
+            matrix = self.model.compiled_linearisation.state_matrix(
+                self.compiled_state, self.rate_matrix is not None
+            )
+            if matrix is not None:
+                return matrix
         n = len(self)
         below = -np.linalg.solve(self.M, np.hstack([self.K, self.C]))
         return np.vstack([np.hstack([np.zeros((n, n)), np.eye(n)]), below])
@@ -65,33 +67,33 @@ class StateSpace(LinearEquations):
     @cached_property
     def B(self) -> Array:
         """Input matrix (2 n + 2 k, inputs)."""
-        return self._pushing(self.controls, self.V)
+        return self._input_columns(self.input_channels, self.V)
 
     @cached_property
     def B_disturbances(self) -> Array:
         """Input matrix (2 n + 2 k, disturbances) of w."""
-        return self._pushing(self.others, self.W)
+        return self._input_columns(self.disturbance_channels, self.W)
 
-    def observed(self, rows: Rows, b: Array) -> tuple[Array, Array]:
+    def state_output_matrices(self, rows: Rows, b: Array) -> tuple[Array, Array]:
         """C (outputs, states) and D (outputs, pushes) of output rows.
 
         `b` (states, pushes) is the input matrix of d/dt z.
         """
-        speeds, rates = [*self.free, *self.drives], self.velocities
-        c, d = np.zeros((len(rows.through), len(self.states))), rows.through
+        speeds, rates = [*self.free_speed_indices, *self.drive_indices], self.velocity_states
+        c, d = np.zeros((len(rows.feedthrough), len(self.state_names))), rows.feedthrough
         for order, wide in rows.orders.items():
             some = wide[:, speeds]
             if order < 2:
-                c[:, (self.positions, rates)[order]] += some
+                c[:, (self.position_states, rates)[order]] += some
             else:  # accelerations
                 c, d = c + some @ self.A[rates], d + some @ b[rates]
         return c, d
 
-    def _pushing(self, pushes: Sequence[Channel], efforts: Array) -> Array:
-        found = np.zeros((len(self.states), len(pushes)))
-        n, k = len(self), len(self.drives)
-        found[n : 2 * n] = np.linalg.solve(self.M, efforts)
-        for j, one in enumerate(pushes):
-            for speed, factor in one.moves:
-                found[2 * n + k + self.drives.index(speed), j] = factor
-        return found
+    def _input_columns(self, pushes: Sequence[Channel], efforts: Array) -> Array:
+        input_matrix = np.zeros((len(self.state_names), len(pushes)))
+        n, k = len(self), len(self.drive_indices)
+        input_matrix[n : 2 * n] = np.linalg.solve(self.M, efforts)
+        for j, channel in enumerate(pushes):
+            for speed, factor in channel.drive_factors:
+                input_matrix[2 * n + k + self.drive_indices.index(speed), j] = factor
+        return input_matrix

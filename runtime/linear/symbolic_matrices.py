@@ -14,10 +14,10 @@ class SymbolicLinearModel:
     Attributes:
         M, C, K, V, W: `sympy.ImmutableMatrix` in the kept symbols; columns as in `Linear`.
         symbols: `sympy.Symbol` by name.
-        numbers: value of each symbol in the scene or state, SI units; `M.subs(numbers)` is the
-            matrix of the linear model.
-        coordinates: names of x.
-        inputs, disturbances: names of v and w.
+        symbol_values: value of each symbol in the scene or state, SI units; `M.subs(numbers)` is
+            the matrix of the linear model.
+        coordinate_names: names of x.
+        input_names, disturbance_names: names of v and w.
     """
 
     M: Any = field(repr=False)
@@ -26,7 +26,7 @@ class SymbolicLinearModel:
     V: Any = field(repr=False)
     W: Any = field(repr=False)
     symbols: Mapping[str, Any]
-    numbers: Mapping[Any, float]
-    coordinates: tuple[str, ...]
-    inputs: tuple[str, ...] = ()
-    disturbances: tuple[str, ...] = ()
+    symbol_values: Mapping[Any, float]
+    coordinate_names: tuple[str, ...]
+    input_names: tuple[str, ...] = ()
+    disturbance_names: tuple[str, ...] = ()

@@ -12,16 +12,16 @@ from mstmm.array_validation import Array
 from mstmm.risk import RUN, Risk, information
 from mstmm.safe_text import abbreviate_names
 
-from ..risk_checks.answers import find_state_risks
+from ..risk_checks.state_risks import find_state_risks
 from .input_channels import GROUND, Channel
 from .mode_solvers import modes
 from .modes import INPUT_RISKS, OUTPUT_LEFT_OUT
 from .operating_point.changes import MATRICES, find_changes
 from .operating_point.departure import LARGEST, Departure, find_departure
-from .operating_point.later import LaterStates
-from .operating_point.starting import find_start_risks
-from .operating_point.sticking import friction_risks, saturation_risks, ways_of
-from .outputs.linear_outputs import left_out
+from .operating_point.friction_risks import friction_risks, independent_motions, saturation_risks
+from .operating_point.initial_speeds import find_start_risks
+from .operating_point.later_states import LaterStates
+from .outputs.linear_outputs import unavailable_outputs
 from .rotors.blades import find_blades
 
 if TYPE_CHECKING:
@@ -41,41 +41,43 @@ def find_linear_risks(linear: LinearEquations) -> Iterator[Risk]:
     yield from unsteady
     if len(linear) <= LARGEST:
         yield from friction_risks(linear)
-    yield from saturation_risks(linear, ways_of(linear))
+    yield from saturation_risks(linear, independent_motions(linear))
     yield from find_start_risks(linear, _ALL_MOTIONS)
     changing = {risk.element for risk in unsteady}
-    yield from (one for one in without_effect(linear, linear.V) if one.element not in changing)
+    yield from (
+        risk for risk in ineffective_input_risks(linear, linear.V) if risk.element not in changing
+    )
     yield from find_omissions(linear)
     if len(linear) <= _ALL_MOTIONS:
         yield from modes(linear, None, None).motion_risks()
     else:
         yield information(
             "stability-unknown", RUN,
-            f"more than {_ALL_MOTIONS} coordinates: not examined for motions that grow or that "
-            "nothing pushes back", "look at the slowest modes, modes(count=...)",
+            f"more than {_ALL_MOTIONS} coordinates: not examined for unstable or unrestrained "
+            "motions", "compute the lowest modes, modes(count=...)",
         )  # fmt: skip
 
 
 def find_omissions(linear: LinearEquations) -> Iterator[Risk]:
     """Risks of omissions of a linear model: controllers, outputs, dependence on time."""
-    for one in linear.model.scene.controller:
+    for controller in linear.model.scene.controller:
         yield information(
             "controller-left-out",
-            f'controller "{one.name}"',
-            f'controller "{one.name}" is left out: its inputs '
-            f"({abbreviate_names(list(one.outputs))}) "
-            "stand still at the values of the scene",
+            f'controller "{controller.name}"',
+            f'controller "{controller.name}" is left out: its inputs '
+            f"({abbreviate_names(list(controller.outputs))}) "
+            "are constant, with the values of the scene",
             "close the loop by the inputs of this model",
         )
-    for name, why in left_out(linear):
+    for name, why in unavailable_outputs(linear):
         yield information(
             "output-left-out", f'output "{name}"', f"output {name} is not among the outputs: {why}",
-            "name an output that has a linear form",
+            "use an output that has a linear form",
         )  # fmt: skip
-    if linear.model.packed.system.timed:
+    if linear.model.packed_scene.system.has_timed_loads:
         yield information(
             "time-dependent", RUN, f"loads depend on time: linearised at t = {linear.state.t:g} s",
-            "give the time that is meant, t=...",
+            "give the intended time, t=...",
         )  # fmt: skip
 
 
@@ -87,12 +89,12 @@ def find_response_risks(
     Instability is an objection because it prevents a steady state.  Inputs and outputs that were
     not requested are left out.
     """
-    asked = {f'input "{one.name}"' for one in pushes}
+    input_elements = {f'input "{channel.name}"' for channel in pushes}
     for risk in linear.risks:
-        if risk.name in INPUT_RISKS and risk.element not in asked:
+        if risk.name in INPUT_RISKS and risk.element not in input_elements:
             continue
         if not (are_outputs_chosen and risk.name == OUTPUT_LEFT_OUT):
-            yield replace(risk, doubt=True) if risk.name == "unstable" else risk
+            yield replace(risk, invalidates=True) if risk.name == "unstable" else risk
 
 
 def _unsteady(linear: LinearEquations) -> Iterator[Risk]:
@@ -102,21 +104,24 @@ def _unsteady(linear: LinearEquations) -> Iterator[Risk]:
     if leaving is not None:
         yield departure_risk(linear.state.t, leaving, later.cause)
     if len(linear) > LARGEST:
-        if later.sparse:
+        if later.compared_states:
             yield information(
                 "stability-unknown", RUN,
                 f"more than {LARGEST} coordinates: not examined for matrices that change along "
-                "the motion or with time", "look at a smaller part of the scene",
+                "the motion or with time", "analyse a smaller part of the scene",
             )  # fmt: skip
         return
-    asked = (*linear.controls, *(() if linear.disturbances == GROUND else linear.others))
-    changing = find_changes(linear, later, asked)
+    input_channels = (
+        *linear.input_channels,
+        *(() if linear.disturbance_names == GROUND else linear.disturbance_channels),
+    )
+    changing = find_changes(linear, later, input_channels)
     if MATRICES in changing:
         yield Risk(
             "changing-coefficients", RUN,
             "the matrices change along the motion of this state or with time: frequencies and "
-            "growth of one moment are not those of the motion",
-            "take to_fixed_frame(), which has constant matrices where the rotor is isotropic"
+            "growth rates at one time are not those of the motion",
+            "use to_fixed_frame(), which has constant matrices where the rotor is isotropic"
             if find_blades(linear)
             else "simulate the motion, or linearise about a state that keeps its matrices",
         )  # fmt: skip
@@ -127,8 +132,8 @@ def changing_risk(linear: LinearEquations, name: str) -> Risk:
     """Risk of an input column or output row that changes along the motion or with time."""
     return Risk(
         "changing-input", f'input "{name}"',
-        f"{name} changes its effect along the motion of this state or with time: the model has "
-        f"that of t = {linear.state.t:g} s", "take efforts and speeds of hinges, or simulate",
+        f"the effect of {name} changes along the motion of this state or with time: the model uses "
+        f"that at t = {linear.state.t:g} s", "use efforts and speeds of hinges, or simulate",
     )  # fmt: skip
 
 
@@ -137,42 +142,42 @@ def departure_risk(t: float, leaving: Departure, cause: str) -> Risk:
     names = abbreviate_names(leaving.coordinates)
     if leaving.t == t:
         means = (
-            f"the state does not last: {names} accelerate there, so that the model holds beside "
-            "the motion through it, and only for a moment"
+            f"the state is not steady: {names} accelerate, so that the model describes deviations "
+            "from the motion through it, for a short time only"
         )
     else:
-        change = "changes slightly" if leaving.is_small else "does not last"
+        change = "changes slowly" if leaving.is_small else "is not steady"
         means = f"the state of t = {t:g} s {change}: {cause}, {leaving} moves {names}"
     return Risk(
-        "unsteady-state", names, means, "take an equilibrium or a steady motion, or simulate",
-        abs(leaving.effort), None, leaving.unit, doubt=not leaving.is_small,
+        "unsteady-state", names, means, "use an equilibrium or a steady motion, or simulate",
+        abs(leaving.effort), None, leaving.unit, invalidates=not leaving.is_small,
     )  # fmt: skip
 
 
-def without_effect(linear: LinearEquations, effects: Array) -> Iterator[Risk]:
+def ineffective_input_risks(linear: LinearEquations, effects: Array) -> Iterator[Risk]:
     """Risks of inputs whose columns in `effects` (n, inputs) are zero."""
-    for name, column in zip(linear.inputs, effects.T, strict=True):
+    for name, column in zip(linear.input_names, effects.T, strict=True):
         if len(linear) and not column.any():
             yield information(
                 "input-without-effect", f'input "{name}"', f"input {name} has no effect here",
-                "choose another input or state",
+                "use another input or state",
             )  # fmt: skip
 
 
 def is_unsteady(linear: LinearEquations) -> bool:
     """Whether closed loops are at an unsteady state, so that accelerations rotate rows."""
-    if linear.mechanism is None or find_departure(linear) is None:
+    if linear.constrained_motion is None or find_departure(linear) is None:
         return False
-    return not _balanced(linear, linear.mechanism.ways)
+    return not _is_balanced(linear, linear.constrained_motion.motion_basis)
 
 
-def _balanced(linear: LinearEquations, ways: Array) -> bool:
+def _is_balanced(linear: LinearEquations, motions: Array) -> bool:
     """Whether efforts along the independent motions of a mechanism are rounding errors.
 
     They are relative to the efforts that cancel.  Rounding may still move weakly constrained
     coordinates.
     """
-    state, tree = linear.state, linear.tree
-    efforts = tree.inverse_dynamics(state.t, state.q, state.u, 0 * state.a, tree.start_memory())
-    left, whole = np.abs(ways.T @ efforts), np.abs(ways).T @ np.abs(efforts)
+    state, tree = linear.state, linear.open_tree
+    efforts = tree.inverse_dynamics(state.t, state.q, state.u, 0 * state.udot, tree.start_memory())
+    left, whole = np.abs(motions.T @ efforts), np.abs(motions).T @ np.abs(efforts)
     return bool((left <= _CANCELLED * whole).all())

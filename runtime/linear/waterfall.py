@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike
 
 from mstmm.array_validation import Array
 from mstmm.errors import SceneError
-from mstmm.risk import AssessedAnswer, DeferredRisks, Risk
+from mstmm.risk import AssessedResult, DeferredRisks, Risk
 
-from ..risk_checks.answers import merge_over_values
+from ..risk_checks.state_risks import merge_over_values
 from . import file_formats
 from .frequency_response import frequency_response
 from .modes import Complex
@@ -25,21 +25,21 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Waterfall(AssessedAnswer):
+class Waterfall(AssessedResult):
     """Frequency response of one output to one input, over a parameter and frequency.
 
     Attributes:
-        points: (m,) values of the parameter.
+        parameter_values: (m,) values of the parameter.
         omega: (k,) angular frequencies, rad/s.
-        values: (m, k) complex amplitudes.
+        response: (m, k) complex amplitudes.
     """
 
-    parameter: str
-    points: Array = field(repr=False)
+    parameter_name: str
+    parameter_values: Array = field(repr=False)
     omega: Array = field(repr=False)
     input: str
     output: str
-    values: Complex = field(repr=False)
+    response: Complex = field(repr=False)
     findings: Iterable[Risk] = field(default=(), repr=False)
 
     def plot(self, path: str | Path | None = None) -> Any:
@@ -49,25 +49,27 @@ class Waterfall(AssessedAnswer):
         """
         from .plots.bode_and_locus import waterfall
 
-        frequency, up = self.omega / (2 * np.pi), np.argsort(self.points)
-        return waterfall(frequency, self.points[up], self.values[up], self.parameter, path)
+        frequency, up = self.omega / (2 * np.pi), np.argsort(self.parameter_values)
+        return waterfall(
+            frequency, self.parameter_values[up], self.response[up], self.parameter_name, path
+        )
 
-    def to_dataset(self) -> Any:
+    def to_xarray(self) -> Any:
         """`xarray.Dataset` with real and imaginary parts; EnvironmentFailure without the extra."""
         along = ("value", "omega")
         arrays: dict[str, Any] = {
-            "real": (along, self.values.real), "imag": (along, self.values.imag),
+            "real": (along, self.response.real), "imag": (along, self.response.imag),
         }  # fmt: skip
         coords: dict[str, Any] = {
-            "value": self.points, "omega": ("omega", self.omega, {"units": "rad/s"}),
+            "value": self.parameter_values, "omega": ("omega", self.omega, {"units": "rad/s"}),
         }  # fmt: skip
-        about = {"parameter": self.parameter, "input": self.input, "output": self.output}
+        about = {"parameter": self.parameter_name, "input": self.input, "output": self.output}
         return file_formats.xarray().Dataset(arrays, coords, about)
 
     def _rows(self) -> Iterator[tuple[str, ...]]:
         """Header, then one row per parameter value and frequency."""
-        yield self.parameter, "omega [rad/s]", "frequency [Hz]", "magnitude", "phase [rad]"
-        for point, row in zip(self.points.tolist(), self.values, strict=True):
+        yield self.parameter_name, "omega [rad/s]", "frequency [Hz]", "magnitude", "phase [rad]"
+        for point, row in zip(self.parameter_values.tolist(), self.response, strict=True):
             for omega, value in zip(self.omega.tolist(), row.tolist(), strict=True):
                 numbers = point, omega, omega / (2 * np.pi), abs(value), cmath.phase(value)
                 yield tuple(map(repr, numbers))
@@ -77,7 +79,7 @@ class Waterfall(AssessedAnswer):
 
         Raises SceneError for another file extension, EnvironmentFailure without the extra.
         """
-        return file_formats.save(path, self.to_dataset, self._rows())
+        return file_formats.save(path, self.to_xarray, self._rows())
 
 
 def waterfall(
@@ -95,11 +97,11 @@ def waterfall(
     for what, name in (("input", pushed), ("output", shown)):
         if not isinstance(name, str):
             raise SceneError(f"{what} = {name!r}: expected one name, not a list of them")
-    found = [frequency_response(at(x), omega, [pushed], [shown]) for x in points.tolist()]
-    rows = np.array([one.values[:, 0, 0] for one in found])
-    first = found[0]
-    each = list(zip(points.tolist(), found, strict=True))
+    responses = [frequency_response(at(x), omega, [pushed], [shown]) for x in points.tolist()]
+    rows = np.array([response.response[:, 0, 0] for response in responses])
+    first = responses[0]
+    each = list(zip(points.tolist(), responses, strict=True))
     return Waterfall(
-        parameter, points, first.omega, first.inputs[0], first.outputs[0], rows,
-        DeferredRisks(lambda: merge_over_values(parameter, [(x, one.risks) for x, one in each])),
+        parameter, points, first.omega, first.input_names[0], first.output_names[0], rows,
+        DeferredRisks(lambda: merge_over_values(parameter, [(x, row.risks) for x, row in each])),
     )  # fmt: skip

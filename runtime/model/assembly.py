@@ -9,16 +9,16 @@ import numpy as np
 
 from mstmm.array_validation import Array
 from mstmm.errors import SceneError
-from mstmm.risk import AssessedAnswer, DeferredRisks, Risk
+from mstmm.risk import AssessedResult, DeferredRisks, Risk
 from mstmm.scene.validators.validation_messages import did_you_mean
 
 from ..engine.compiled_scene import CompiledScene
 from ..engine.loops.loop_analysis import LoopStart
 from ..engine.loops.loop_calls import LoopCalls
-from ..risk_checks.answers import find_state_risks
+from ..risk_checks.state_risks import find_state_risks
 
 
-class Assembly(AssessedAnswer, tuple[Array, Array]):
+class Assembly(AssessedResult, tuple[Array, Array]):
     """Closed state (q, u) with findings about it."""
 
     findings: Iterable[Risk]
@@ -43,34 +43,36 @@ def assemble(
     branch: int | None = None,
 ) -> Assembly:
     """Nearest closed state, see `Model.assemble`; hinges `fast` keep their speeds (None: all)."""
-    hold, hinges = _held_hinges(compiled, hold), compiled.layout.hinges
-    if compiled.closed is None:
+    hold, hinges = _held_hinges(compiled, hold), compiled.coordinate_layout.hinges
+    if compiled.loop_start is None:
         return Assembly(compiled, t, q.copy(), u.copy())
     q, u = LoopCalls(compiled.looped, q, t=t).driven(q, u)
     moving = [
-        hinge.name for hinge in compiled.packed.described.hinge
+        hinge.name for hinge in compiled.packed_scene.user_scene.hinge
         if not hinge.is_weld and hinge.drive is None and u[hinges[hinge.name].u_slice].any()
     ]  # fmt: skip
-    if sum(hinges[name].nu for name in moving) > compiled.closed.loops.mobility:
+    if sum(hinges[name].nu for name in moving) > compiled.loop_start.loops.mobility:
         moving = []  # a complete state: only as many speeds as the mobility can be kept
     fast = moving if fast is None else fast
     if branch is None:
-        state = compiled.closed.nearest(q, u, hold, fast, t)
+        state = compiled.loop_start.assemble_nearest(q, u, hold, fast, t)
     else:
-        start = compiled.closed.led(_branch_coordinates(compiled.closed, branch), q, hold, t)
-        state = compiled.closed.assembled(start, u, hold, fast, t)
+        start = compiled.loop_start.follow_branch(
+            _branch_coordinates(compiled.loop_start, branch), q, hold, t
+        )
+        state = compiled.loop_start.assemble(start, u, hold, fast, t)
     return Assembly(compiled, t, *state)
 
 
 def assemble_path(compiled: CompiledScene, q: Array, hold: Sequence[str], branch: int) -> Array:
     """Closed states along a path of held coordinates; see `Model.assemble_path`."""
     hold = _held_hinges(compiled, hold)
-    if compiled.closed is None:
+    if compiled.loop_start is None:
         return q.copy()
-    state, states = _branch_coordinates(compiled.closed, branch), np.empty_like(q)
+    state, states = _branch_coordinates(compiled.loop_start, branch), np.empty_like(q)
     for k, row in enumerate(q):
         target = LoopCalls(compiled.looped, row).driven(row, np.zeros(compiled.nu))[0]
-        states[k] = state = compiled.closed.led(state, target, hold)
+        states[k] = state = compiled.loop_start.follow_branch(state, target, hold)
     return states
 
 
@@ -84,7 +86,7 @@ def _branch_coordinates(closed: LoopStart, number: int) -> Array:
 
 def _held_hinges(compiled: CompiledScene, hold: Sequence[str]) -> list[str]:
     """Names of the hinges in `hold`; raises SceneError for anything else."""
-    hinges, modal = compiled.layout.hinges, compiled.layout.modal
+    hinges, modal = compiled.coordinate_layout.hinges, compiled.coordinate_layout.modal
     if isinstance(hold, str) or not isinstance(hold, Collection):
         raise SceneError(f"hold = {hold!r:.60}: expected a list of names of hinges")
     for name in hold:

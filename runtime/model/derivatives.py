@@ -72,7 +72,7 @@ class Derivatives:
         """
         return np.block([[self.rate_q, self.rate_u], [self.q, self.u]])
 
-    def kept_in(self, out: Derivatives) -> Derivatives:
+    def copy_to(self, out: Derivatives) -> Derivatives:
         """Copy into `out` and return it; raises SceneError for other shapes or parameters."""
         if not isinstance(out, Derivatives) or list(out.parameters) != list(self.parameters):
             raise SceneError(
@@ -96,19 +96,21 @@ class Differentiation:
         _check_differentiable(model)
         if names:
             structure, self.p, self.slopes = parameter_derivatives(
-                model.scene, known, names, model.packed
+                model.scene, known, names, model.packed_scene
             )
         else:
-            packed = model.packed
+            packed = model.packed_scene
             structure, self.p = structure_of(packed.system, known, floors=packed.floors)
             self.slopes = np.zeros((len(self.p), 0))
-        self._live = LiveInputs(model.packed.system, structure.inputs)
+        self._live_inputs = LiveInputs(model.packed_scene.system, structure.inputs)
         self.tangents = TangentKernels(model.fusion, structure, bool(names))
         self._memory = np.zeros(structure.n_memory)
         #: Without drives all speeds are free, and coordinates do not depend on time.
-        self._undriven = not names and not model.packed.system.driven
+        self._undriven = not names and not model.packed_scene.system.driven
         self._units = np.eye(model.nu)
-        self._has_rate_speeds = all(hinge.straight for hinge in model.layout.hinges.values())
+        self._has_rate_speeds = all(
+            hinge.rates_are_speeds for hinge in model.coordinate_layout.hinges.values()
+        )
 
     def __call__(
         self,
@@ -129,7 +131,7 @@ class Differentiation:
             ("efforts", np.zeros(nu) if efforts is None else efforts, nu),
         )  # fmt: skip
         udot = accelerations()
-        arrays = self.at(times[:, None], coordinates, speeds, extra)
+        arrays = self.evaluate(times[:, None], coordinates, speeds, extra)
 
         def reshape(name: str, *shape: int) -> Array:
             return arrays[name].reshape(*lead, *shape)
@@ -147,7 +149,7 @@ class Differentiation:
 
         None without such code, or if it fails: forward mode then reports the reason.
         """
-        call = self._model.slopes.call(_SINGLE_SAVING)
+        call = self._model.compiled_linearisation.thread_call(_SINGLE_SAVING)
         arrays = None if call is None else call.derivatives(t, q, u)
         if arrays is None:
             return None
@@ -158,14 +160,18 @@ class Differentiation:
     def _by_linear_equations(
         self, t: Array, q: Array, u: Array, efforts: Array
     ) -> dict[str, Array] | None:
-        """`at` by the code of the linear equations; None without it."""
-        call = self._model.slopes.call(_SINGLE_SAVING * len(q)) if self._undriven else None
+        """`evaluate` by the code of the linear equations; None without it."""
+        call = (
+            self._model.compiled_linearisation.thread_call(_SINGLE_SAVING * len(q))
+            if self._undriven
+            else None
+        )
         if call is None:
             return None
         n = self._model.nu
         slopes, rate_matrices = np.empty((len(q), n, 3 * n + 1)), np.empty((len(q), n, n))
         for k, state in enumerate(zip(t[:, 0].tolist(), q, u, efforts, strict=True)):
-            equations = call.with_slopes(*state)
+            equations = call.evaluate_with_derivatives(*state)
             if equations is None:
                 return None
             slopes[k], rate_matrices[k] = equations[1], equations[0].G
@@ -175,7 +181,7 @@ class Differentiation:
             "rate_u": np.repeat(self._units[None], len(q), axis=0),
         }  # fmt: skip
 
-    def at(self, t: Array, q: Array, u: Array, efforts: Array) -> dict[str, Array]:
+    def evaluate(self, t: Array, q: Array, u: Array, efforts: Array) -> dict[str, Array]:
         """Derivatives (n, row, column) at n states, by the names of `Derivatives`.
 
         t (n, 1), q (n, nq), u and efforts (n, nu); parameters are columns of one array.
@@ -185,8 +191,8 @@ class Differentiation:
             return at_once
         nu = self._model.nu
         states = {
-            "p": np.atleast_2d(self._live.at(self.p, t[:, 0])), "t": t, "q": q, "u": u,
-            "memory": self._memory[None], "efforts": efforts,
+            "p": np.atleast_2d(self._live_inputs.numbers_at(self.p, t[:, 0])), "t": t, "q": q,
+            "u": u, "memory": self._memory[None], "efforts": efforts,
         }  # fmt: skip
         self.tangents.expect(len(q) * (4 * nu + 1 + len(self.names)))
         units, columns = np.eye(nu)[None], self.tangents.columns
@@ -205,11 +211,11 @@ class Differentiation:
         arrays["rate_q"], arrays["rate_u"] = self._rates(states, increments)
         return arrays
 
-    def turning(self, q: Array, u: Array, t: float = 0.0) -> Array:
+    def rate_matrix(self, q: Array, u: Array, t: float = 0.0) -> Array:
         """`rate_q` (nu, nu) of one state."""
         states = {
-            "p": np.atleast_2d(self._live.at(self.p, np.array([t]))), "t": np.array([[t]]),
-            "q": q[None], "u": u[None], "memory": self._memory[None],
+            "p": np.atleast_2d(self._live_inputs.numbers_at(self.p, np.array([t]))),
+            "t": np.array([[t]]), "q": q[None], "u": u[None], "memory": self._memory[None],
             "efforts": np.zeros((1, self._model.nu)),
         }  # fmt: skip
         increments = self.tangents.columns("u", "qdot", states, np.eye(self._model.nu)[None])
@@ -220,7 +226,8 @@ class Differentiation:
             if not np.isfinite(array).all():
                 state, row, _ = (int(k[0]) for k in np.nonzero(~np.isfinite(array)))
                 raise NumericalFailure(
-                    f"the derivative of {self._model.layout.u_names[row]}'s acceleration with "
+                    f"the derivative of {self._model.coordinate_layout.u_names[row]}'s "
+                    f"acceleration with "
                     f"respect to {name} is not finite at t = {t[state, 0]:.9g} s"
                 )
 
@@ -240,7 +247,7 @@ class Differentiation:
         for j, unit in enumerate(np.eye(nu)):
             changes[:, j] -= columns("q", "qdot", {**states, "u": unit[None]}, motion)[:, 0]
         n, changes = np.swapaxes(n, 1, 2), np.swapaxes(changes, 1, 2)
-        for owner in self._model.layout.owners:
+        for owner in self._model.coordinate_layout.owners:
             rows, speeds = owner.q_slice, owner.u_slice
             inverse = np.linalg.pinv(n[:, rows, speeds])
             rate_q[:, speeds, speeds] = inverse @ changes[:, rows, speeds]
@@ -250,7 +257,7 @@ class Differentiation:
 
 def _check_differentiable(model: CompiledScene) -> None:
     """Raise SceneError for releases and for too many bodies."""
-    packed = model.packed
+    packed = model.packed_scene
     if packed.releases:
         names = ", ".join(f'"{name}"' for name in packed.releases)
         raise SceneError(

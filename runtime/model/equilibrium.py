@@ -9,14 +9,17 @@ import numpy as np
 
 from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure
-from mstmm.risk import AssessedAnswer, DeferredRisks, Risk
+from mstmm.risk import AssessedResult, DeferredRisks, Risk
 from mstmm.safe_text import abbreviate_names
 
 from ..engine.characteristic_scales import scene_length, speed_scales
 from ..engine.engine_calls import Probe
-from ..engine.statics.rest import Undetermined, Unsettled
-from ..engine.statics.rest_by_sweep import MAX_STEPS
-from ..risk_checks.answers import find_state_risks
+from ..engine.statics.pseudo_transient_equilibrium import MAX_STEPS
+from ..engine.statics.static_equilibrium import (
+    EquilibriumNotFoundError,
+    UndeterminedEquilibriumError,
+)
+from ..risk_checks.state_risks import find_state_risks
 from ..run.scene_system import SceneSystem
 from .equilibrium_search import MAX_INDEPENDENT, EquilibriumSearch, Progress
 from .full_turns import remove_full_turns
@@ -36,20 +39,21 @@ _MAX_SPIN_MOTION = 5e-2
 _AXES = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
-class Equilibrium(AssessedAnswer, np.ndarray[Any, np.dtype[np.float64]]):
+class Equilibrium(AssessedResult, np.ndarray[Any, np.dtype[np.float64]]):
     """Array q (nq,) of an equilibrium with residuals, instabilities and findings.
 
     `residuals` are the remaining efforts in N or N*m (of modal coordinates N, or N*m for twist) by
     the names of the free speeds (of mechanisms with mobility up to 200, of the independent speeds).
-    `unstable` are those of these speeds with which a disturbed state departs, where efforts have a
-    potential (a saddle or a maximum).  Arrays computed from this one have neither, and no findings.
+    `unstable_speeds` are those of these speeds with which a disturbed state departs, where efforts
+    have a potential (a saddle or a maximum).  Arrays computed from this one have neither, and no
+    findings.
     """
 
     residuals: dict[str, float]
-    unstable: tuple[str, ...]
+    unstable_speeds: tuple[str, ...]
 
     def __array_finalize__(self, source: object) -> None:
-        self.residuals, self.unstable, self.findings = {}, (), ()
+        self.residuals, self.unstable_speeds, self.findings = {}, (), ()
 
 
 def equilibrium(
@@ -61,21 +65,21 @@ def equilibrium(
     progress: Progress | None = None,
 ) -> Equilibrium:
     """Static equilibrium near q; see `Model.equilibrium`."""
-    start, name = q, model.layout.u_name
-    if model.freedom is not None:
+    start, name = q, model.coordinate_layout.u_name
+    if model.independent_speeds is not None:
         start = q = SceneSystem(model.looped).start(t, q, np.zeros(model.nu))[: model.nq]
     search = EquilibriumSearch(model, t)
     try:
         rest, stability = search.find(q, tolerance, max_steps, progress)
-    except Undetermined as failure:
+    except UndeterminedEquilibriumError as failure:
         raise _undetermined_error(
-            [name(failure.problem.places[k]) for k in failure.places]
+            [name(failure.problem.coordinate_indices[k]) for k in failure.coordinate_indices]
         ) from None
     except NumericalFailure as failure:
         unbalanced = search.find_unbalanced(q)
         if unbalanced is not None:
             raise _unbalanced_error(model, q, *unbalanced) from None
-        if not isinstance(failure, Unsettled):
+        if not isinstance(failure, EquilibriumNotFoundError):
             raise
         efforts = _list_largest_efforts(model, failure)
         raise NumericalFailure(
@@ -86,7 +90,7 @@ def equilibrium(
     rest = remove_full_turns(model, start, _apply_drives(model, rest, t), t)
     result = rest.view(Equilibrium)
     result.residuals = search.residuals(rest)
-    result.unstable = _moving_speeds(model, rest, stability.unstable)
+    result.unstable_speeds = _moving_speeds(model, rest, stability.unstable)
     result.findings = DeferredRisks(lambda: _find_risks(model, t, result, spins))
     return result
 
@@ -96,11 +100,11 @@ def _find_risks(
 ) -> Iterator[Risk]:
     """Findings about an equilibrium: risks of the state, instability, and free spins."""
     yield from find_state_risks(model, t, np.asarray(found), np.zeros(model.nu))
-    if found.unstable:
-        names = abbreviate_names(found.unstable)
+    if found.unstable_speeds:
+        names = abbreviate_names(found.unstable_speeds)
         yield Risk(
             "unstable", names, f"unstable: a disturbance grows along {names}",
-            "give another start, q=..., for a stable equilibrium", doubt=False,
+            "give another start, q=..., for a stable equilibrium", invalidates=False,
         )  # fmt: skip
     if spins:
         names = abbreviate_names(spins)
@@ -109,7 +113,7 @@ def _find_risks(
             f"bodies may spin about axes through their mass centre and all their ends: {names} "
             "have no restoring load, and nothing else depends on them",
             "no action is needed; a universal hinge instead of a ball hinge removes the spin",
-            doubt=False,
+            invalidates=False,
         )  # fmt: skip
 
 
@@ -127,7 +131,7 @@ def _unbalanced_error(
     work = np.abs(motion * loads)
     order = np.argsort(-work, kind="stable")
     concerned = [int(j) for j in order if work[j] > _MOVING_SHARE * work.max()]
-    named = [f"{loads[j]:.3g} along {model.layout.u_name(j)}" for j in concerned]
+    named = [f"{loads[j]:.3g} along {model.coordinate_layout.u_name(j)}" for j in concerned]
     moving = abbreviate_names(_moving_speeds(model, q, [motion]))
     return NumericalFailure(
         f"no equilibrium exists: unbalanced load of {abbreviate_names(named)} (N or N*m); it does "
@@ -137,19 +141,23 @@ def _unbalanced_error(
 
 
 def _moving_speeds(model: CompiledScene, q: Array, motions: list[Array]) -> tuple[str, ...]:
-    """Names of the speeds that move in some motions (nu,) at q.
+    """Names of the speeds that at least one of the motions, (nu,) each, moves noticeably at q.
 
     Of the independent speeds alone for mechanisms that are not too large.
     """
     moving, sizes = np.zeros(model.nu, dtype=bool), speed_scales(model)
     places = np.arange(model.nu)
-    if motions and model.closed is not None and model.closed.loops.mobility <= MAX_INDEPENDENT:
-        assert model.freedom is not None
-        places = np.array(model.freedom.chosen(q))
+    if (
+        motions
+        and model.loop_start is not None
+        and model.loop_start.loops.mobility <= MAX_INDEPENDENT
+    ):
+        assert model.independent_speeds is not None
+        places = np.array(model.independent_speeds.select(q))
     for motion in motions:
         far = np.abs(motion / sizes)[places]
         moving[places] |= far > _MOVING_SHARE * far.max(initial=0.0)
-    return tuple(model.layout.u_name(int(j)) for j in np.flatnonzero(moving))
+    return tuple(model.coordinate_layout.u_name(int(j)) for j in np.flatnonzero(moving))
 
 
 def _free_spins(model: CompiledScene, q: Array, t: float, motions: list[Array]) -> tuple[str, ...]:
@@ -157,7 +165,7 @@ def _free_spins(model: CompiledScene, q: Array, t: float, motions: list[Array]) 
 
     No end or mass centre moves then; raises NumericalFailure for any other neutral motion.
     """
-    engine, packed, count = model.looped, model.packed, len(motions)
+    engine, packed, count = model.looped, model.packed_scene, len(motions)
     if not motions:
         return ()
     probes = [
@@ -179,7 +187,7 @@ def _free_spins(model: CompiledScene, q: Array, t: float, motions: list[Array]) 
 def _body_points(model: CompiledScene, name: str, body: Any) -> Iterator[tuple[float, ...]]:
     """Inboard hinge, mass centre and ends of a body, internal axes, m."""
     yield 0.0, 0.0, 0.0
-    packed = model.packed
+    packed = model.packed_scene
     if hasattr(body, "center_of_mass"):
         yield packed.mass_center(name)
     for end in body.ends:
@@ -191,13 +199,13 @@ def _apply_drives(model: CompiledScene, q: Array, t: float) -> Array:
     return SceneSystem(model.looped).start(t, q, np.zeros(model.nu))[: model.nq]
 
 
-def _list_largest_efforts(model: CompiledScene, failure: Unsettled) -> str:
+def _list_largest_efforts(model: CompiledScene, failure: EquilibriumNotFoundError) -> str:
     """Text of the largest efforts by name, ranked by work over a characteristic motion."""
     problem, residual = failure.problem, failure.residual
-    places = range(model.nu) if problem is None else problem.places
+    places = range(model.nu) if problem is None else problem.coordinate_indices
     sizes = speed_scales(model)[list(places)]
     order = np.argsort(-np.abs(residual * sizes))[:_MAX_LISTED]
-    names = [model.layout.u_name(places[k]) for k in order]
+    names = [model.coordinate_layout.u_name(places[k]) for k in order]
     listed = [f"{residual[k]:.3g} along {name}" for k, name in zip(order, names, strict=True)]
     others = len(residual) - len(listed)
     return ", ".join(listed) + " (N or N*m)" + (f" and {others} smaller" if others > 0 else "")

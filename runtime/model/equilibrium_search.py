@@ -17,11 +17,16 @@ from ..engine.characteristic_scales import scene_length, speed_scales, total_mas
 from ..engine.looped_engine import LoopedEngine
 from ..engine.loops.independent_speeds import IndependentSpeeds
 from ..engine.loops.loop_calls import LoopCalls
-from ..engine.statics.rest import Rest, Unsettled, approached, unstable_coordinates
-from ..engine.statics.rest_by_sweep import RestBySweep
+from ..engine.statics.pseudo_transient_equilibrium import PseudoTransientEquilibrium
 from ..engine.statics.shifted_stiffness import ShiftedStiffness
 from ..engine.statics.stability import Stability, find_stability
-from ..engine.statics.unbalanced import FARTHEST, find_unbalanced_motion
+from ..engine.statics.static_equilibrium import (
+    EquilibriumNotFoundError,
+    EquilibriumProblem,
+    find_equilibrium,
+    unstable_coordinates,
+)
+from ..engine.statics.unbalanced_loads import FARTHEST, find_unbalanced_motion
 from ..engine.tangent_matrix import TangentMatrix
 from ..packing.loops.system_variants import with_rotors
 from ..packing.scene_packing import packed_system
@@ -67,13 +72,15 @@ class _SweepSearch:
         self, q: Array, tolerance: float, max_steps: int, progress: Progress | None
     ) -> tuple[Array, bool]:
         """Equilibrium q, and whether any steps were needed."""
-        sweep = RestBySweep(self.stiffness, self.settled, self._load, max_steps, progress)
+        sweep = PseudoTransientEquilibrium(
+            self.stiffness, self.consistent_state, self._load, max_steps, progress
+        )
         return sweep.find(q, tolerance), sweep.steps > 0
 
-    def settled(self, q: Array) -> Array:
+    def consistent_state(self, q: Array) -> Array:
         """Nearby state with consistent drives, quaternions and loops."""
         try:
-            return self._scene.start(self.stiffness.t, q, self.stiffness.still)[: len(q)]
+            return self._scene.start(self.stiffness.t, q, self.stiffness.zero_speeds)[: len(q)]
         except SceneError as error:
             raise NumericalFailure(str(error)) from None
 
@@ -86,17 +93,23 @@ class EquilibriumSearch:
 
     def __init__(self, model: CompiledScene, t: float) -> None:
         self._model, self._t = model, t
-        mobility = len(model.free_speeds) if model.closed is None else model.closed.loops.mobility
+        mobility = (
+            len(model.free_speed_indices)
+            if model.loop_start is None
+            else model.loop_start.loops.mobility
+        )
         self._is_driven = mobility == 0  # drives and loops alone determine the state
         self._has_few_independent = mobility <= MAX_INDEPENDENT
-        self._is_small = mobility <= (_MAX_DENSE if model.freedom is None else _MAX_DENSE_LOOPS)
+        self._is_small = mobility <= (
+            _MAX_DENSE if model.independent_speeds is None else _MAX_DENSE_LOOPS
+        )
         self._light_search: _SweepSearch | None = None
         try:
             self._light_search = _SweepSearch(model, t, 1.0)
         except SceneError:  # old elements without derivatives
             if not self._is_small:
                 raise
-        self._difference_problem: Rest | None = None
+        self._difference_problem: EquilibriumProblem | None = None
 
     def find(
         self, q: Array, tolerance: float, max_steps: int, progress: Progress | None
@@ -120,7 +133,7 @@ class EquilibriumSearch:
         for _ in range(_MAX_SADDLES if has_moved else 0):
             if not stability.unstable:
                 break
-            start = self._off_saddle(self._light_search.stiffness, rest, stability.unstable)
+            start = self._step_off_saddle(self._light_search.stiffness, rest, stability.unstable)
             try:
                 rest, _ = self._find_by_sweeps(self._light_search, start, *limits)
             except NumericalFailure:
@@ -140,16 +153,16 @@ class EquilibriumSearch:
         At a singular configuration the loop loads, and with them the stiffness, are indeterminate,
         so that a negative stiffness along `motions` proves no instability.
         """
-        model, freedom, stiffness = self._model, self._model.freedom, search.stiffness
+        model, freedom, stiffness = self._model, self._model.independent_speeds, search.stiffness
         coordinates = _coordinates_of_speeds(model, list(range(model.nu)))
         if (
             freedom is None
-            or model.closed is None
+            or model.loop_start is None
             or coordinates is None
             or not self._has_few_independent
         ):
             return False
-        if len(freedom.chosen(q)) <= model.closed.loops.mobility:
+        if len(freedom.select(q)) <= model.loop_start.loops.mobility:
             return False
         weights = np.random.default_rng(0).uniform(-1.0, 1.0, (_RANDOM_COUNT, len(motions)))
         resists, directions = list[bool](), [*motions, *(weights @ np.array(motions))]
@@ -158,7 +171,7 @@ class EquilibriumSearch:
             increment = _TEST_STEP / stiffness.length(direction) * direction
             step = stiffness.tangent.coordinates(increment)
             try:
-                nearby = search.settled(q + step)
+                nearby = search.consistent_state(q + step)
             except NumericalFailure:
                 continue
             change = (nearby - q)[coordinates]
@@ -183,23 +196,25 @@ class EquilibriumSearch:
         first_steps = max_steps if self._is_small else min(max_steps, _LIGHT_STEPS)
         try:
             return light.find(q, tolerance, first_steps, progress)
-        except Unsettled:
+        except EquilibriumNotFoundError:
             if first_steps == max_steps:
                 raise
         remaining = max_steps - first_steps
         try:
-            heavy = _SweepSearch(model, self._t, float(len(model.free_speeds)))
+            heavy = _SweepSearch(model, self._t, float(len(model.free_speed_indices)))
             rest, _ = heavy.find(q, tolerance, remaining, progress)
             return light.find(rest, tolerance, remaining, progress)[0], True
         except NumericalFailure:
             pass
         try:
             return light.find(q, tolerance, remaining, progress)
-        except Unsettled as failure:
-            raise Unsettled(f"not at rest after {max_steps} steps", failure.residual) from None
+        except EquilibriumNotFoundError as failure:
+            raise EquilibriumNotFoundError(
+                f"not converged after {max_steps} steps", failure.residual
+            ) from None
 
     @staticmethod
-    def _off_saddle(stiffness: ShiftedStiffness, q: Array, motions: list[Array]) -> Array:
+    def _step_off_saddle(stiffness: ShiftedStiffness, q: Array, motions: list[Array]) -> Array:
         """q after a small step along the sum of some motions (nu,)."""
         direction = np.zeros_like(motions[0])
         for motion in motions:
@@ -209,15 +224,15 @@ class EquilibriumSearch:
 
     def _find_by_differences(self, q: Array, tolerance: float) -> tuple[Array, Stability]:
         model = self._model
-        if model.freedom is not None:
-            problem = _mechanism_problem(model, model.freedom, q, self._t)
+        if model.independent_speeds is not None:
+            problem = _mechanism_problem(model, model.independent_speeds, q, self._t)
         else:
-            problem = _tree_problem(model, self._t, list(model.free_speeds))
-        rest = approached(problem, q, tolerance)
-        self._difference_problem = problem = problem.at(rest)
+            problem = _tree_problem(model, self._t, list(model.free_speed_indices))
+        rest = find_equilibrium(problem, q, tolerance)
+        self._difference_problem = problem = problem.at_state(rest)
         units = np.eye(model.nu)
         return rest, Stability(
-            [units[problem.places[k]] for k in unstable_coordinates(problem, rest)]
+            [units[problem.coordinate_indices[k]] for k in unstable_coordinates(problem, rest)]
         )
 
     def find_unbalanced(self, q: Array) -> tuple[Array, Array, int] | None:
@@ -225,71 +240,86 @@ class EquilibriumSearch:
 
         Returns the motion, the loads (nu,) at q and the number of states; else None.
         """
-        model, freedom = self._model, self._model.freedom
+        model, freedom = self._model, self._model.independent_speeds
         if self._is_driven or not self._has_few_independent:
             return None
         zeros = np.zeros(model.nu)
         try:
             if freedom is None:
-                problem = _tree_problem(model, self._t, list(model.free_speeds))
+                problem = _tree_problem(model, self._t, list(model.free_speed_indices))
             else:
                 problem = _mechanism_problem(model, freedom, q, self._t)
-            problem = replace(problem, needed=self._efforts_in_inboard_axes(problem))
+            problem = replace(problem, required_efforts=self._efforts_in_inboard_axes(problem))
             farthest = FARTHEST if freedom is None else _FARTHEST_LOOP_STATE
             unbalanced = find_unbalanced_motion(problem, q, farthest)
             if unbalanced is None:
                 return None
             motion = zeros.copy()
-            motion[list(problem.places)] = unbalanced[0]
+            motion[list(problem.coordinate_indices)] = unbalanced[0]
             for places, axes in self._axes_of_free_hinges(q):
                 motion[places] = axes.T @ motion[places]
             if freedom is not None:
-                motion = freedom.following(q, problem.places) @ unbalanced[0]
+                motion = freedom.motion_matrix(q, problem.coordinate_indices) @ unbalanced[0]
         except (NumericalFailure, SceneError):
             return None
         engine = model.looped
         efforts = engine.inverse_dynamics(self._t, q, zeros, zeros, engine.start_memory())
         return motion, -np.asarray(efforts), unbalanced[1]
 
-    def _efforts_in_inboard_axes(self, problem: Rest) -> Callable[[Array], Array]:
+    def _efforts_in_inboard_axes(self, problem: EquilibriumProblem) -> Callable[[Array], Array]:
         """Function of the efforts, with forces on free hinges in the axes of their inboard ends."""
 
-        def needed(q: Array) -> Array:
+        def required_efforts(q: Array) -> Array:
             efforts = np.zeros(self._model.nu)
-            efforts[list(problem.places)] = problem.needed(q)
+            efforts[list(problem.coordinate_indices)] = problem.required_efforts(q)
             for places, axes in self._axes_of_free_hinges(q):
                 efforts[places] = axes @ efforts[places]
-            return efforts[list(problem.places)]
+            return efforts[list(problem.coordinate_indices)]
 
-        return needed
+        return required_efforts
 
     def _axes_of_free_hinges(self, q: Array) -> Iterator[tuple[NDArray[np.int64], Array]]:
         """Indices of the velocity, and axes (3, 3) at q, of each free hinge of a tree."""
         model, engine, units = self._model, self._model.looped, np.eye(self._model.nu)
-        for slots in model.layout.hinges.values() if model.freedom is None else ():
+        for slots in (
+            model.coordinate_layout.hinges.values() if model.independent_speeds is None else ()
+        ):
             places = np.arange(slots.nu)[:3] + slots.u_slice.start
-            if slots.nu == 6 and not slots.straight and {*places} <= {*model.free_speeds}:
+            if (
+                slots.nu == 6
+                and not slots.rates_are_speeds
+                and {*places} <= {*model.free_speed_indices}
+            ):
                 rates = [engine.rates(self._t, q, units[j], engine.start_memory()) for j in places]
                 yield places, np.array(rates)[:, slots.q : slots.q + 3].T
 
     def residuals(self, q: Array) -> dict[str, float]:
         """Remaining efforts at an equilibrium by the names of speeds."""
-        model, freedom = self._model, self._model.freedom
+        model, freedom = self._model, self._model.independent_speeds
         if self._is_driven:
             return {}
         if self._light_search is None or self._difference_problem is not None:
             assert self._difference_problem is not None
-            places, efforts = self._difference_problem.places, self._difference_problem.needed(q)
-            return {model.layout.u_name(j): float(x) for j, x in zip(places, efforts, strict=True)}
+            places, efforts = (
+                self._difference_problem.coordinate_indices,
+                self._difference_problem.required_efforts(q),
+            )
+            return {
+                model.coordinate_layout.u_name(j): float(x)
+                for j, x in zip(places, efforts, strict=True)
+            }
         stiffness = self._light_search.stiffness
         if freedom is None or not self._has_few_independent:
-            cut_speeds, missing = set(stiffness.own.tolist()), stiffness.residual(q)
-            places = tuple(j for j in model.free_speeds if j not in cut_speeds)
+            cut_speeds, missing = set(stiffness.closing_speeds.tolist()), stiffness.residual(q)
+            places = tuple(j for j in model.free_speed_indices if j not in cut_speeds)
             efforts = missing[list(places)]
         else:
-            places = freedom.chosen(q)
-            efforts = freedom.following(q, places).T @ stiffness.residual(q)
-        return {model.layout.u_name(j): float(x) for j, x in zip(places, efforts, strict=True)}
+            places = freedom.select(q)
+            efforts = freedom.motion_matrix(q, places).T @ stiffness.residual(q)
+        return {
+            model.coordinate_layout.u_name(j): float(x)
+            for j, x in zip(places, efforts, strict=True)
+        }
 
 
 def _count_steps(progress: Progress | None) -> Progress | None:
@@ -300,23 +330,23 @@ def _count_steps(progress: Progress | None) -> Progress | None:
 
 def _with_rotors(model: CompiledScene, weight: float) -> LoopedEngine:
     """Engine of the model with rotors on all hinges, of `weight` times the mass of the scene."""
-    packed = model.packed
+    packed = model.packed_scene
     rotors = weight * (total_mass(model) or 1.0) * (scene_length(model) / speed_scales(model)) ** 2
     engine = LoopedEngine(packed_system(with_rotors(packed.system, rotors.tolist()), packed))
-    if model.closed is not None:
-        LoopCalls(engine, model.closed.start[0])  # determines its redundant rows
+    if model.loop_start is not None:
+        LoopCalls(engine, model.loop_start.start[0])  # determines its redundant rows
     return engine
 
 
-def _tree_problem(model: CompiledScene, t: float, free: list[int]) -> Rest:
+def _tree_problem(model: CompiledScene, t: float, free: list[int]) -> EquilibriumProblem:
     engine, zeros = model.looped, np.zeros(model.nu)
-    memory, quaternions = engine.start_memory(), model.layout.quaternions
+    memory, quaternions = engine.start_memory(), model.coordinate_layout.quaternions
     coordinates = _coordinates_of_speeds(model, free)
 
-    def needed(q: Array) -> Array:
+    def required_efforts(q: Array) -> Array:
         return np.asarray(engine.inverse_dynamics(t, q, zeros, zeros, memory)[free])
 
-    def moved(q: Array, increment: Array) -> Array:
+    def move(q: Array, increment: Array) -> Array:
         if coordinates is not None:
             result = q.copy()
             result[coordinates] += increment
@@ -329,12 +359,12 @@ def _tree_problem(model: CompiledScene, t: float, free: list[int]) -> Rest:
             result[first : first + 4] = unit / np.linalg.norm(unit)
         return np.asarray(result)
 
-    return Rest(needed, moved, speed_scales(model)[free], tuple(free))
+    return EquilibriumProblem(required_efforts, move, speed_scales(model)[free], tuple(free))
 
 
 def _mechanism_problem(
     model: CompiledScene, freedom: IndependentSpeeds, q: Array, t: float
-) -> Rest:
+) -> EquilibriumProblem:
     """Equilibrium problem of a mechanism in its independent speeds at a closed q.
 
     The efforts are those of the tree along the free motions of the loops; constraint loads do no
@@ -342,36 +372,40 @@ def _mechanism_problem(
     """
     engine, zeros, states = model.looped, np.zeros(model.nu), ClosedStates(model, freedom, t)
 
-    def problem_along(places: tuple[int, ...]) -> Rest:
+    def problem_along(places: tuple[int, ...]) -> EquilibriumProblem:
         scales = states.sizes[list(places)]
 
-        def needed(q: Array) -> Array:
+        def required_efforts(q: Array) -> Array:
             efforts = engine.inverse_dynamics(t, q, zeros, zeros, states.memory)
-            reduced = np.asarray(freedom.following(q, places).T @ efforts)
+            reduced = np.asarray(freedom.motion_matrix(q, places).T @ efforts)
             # Motions without load must not follow the rounding of efforts that cancel.
             work = float(np.abs(efforts) @ freedom.sizes)
             return np.where(np.abs(reduced) * scales > _CANCELLATION * work, reduced, 0.0)
 
-        def moved(q: Array, increment: Array) -> Array:
-            return states.moved(q, places, increment)
+        def move(q: Array, increment: Array) -> Array:
+            return states.move(q, places, increment)
 
-        problem = Rest(needed, moved, scales, places, lambda q: problem_at(places, problem, q))
+        problem = EquilibriumProblem(
+            required_efforts, move, scales, places, lambda q: problem_at(places, problem, q)
+        )
         return problem
 
-    def problem_at(places: tuple[int, ...], problem: Rest, q: Array) -> Rest:
-        chosen = freedom.chosen(q)
+    def problem_at(
+        places: tuple[int, ...], problem: EquilibriumProblem, q: Array
+    ) -> EquilibriumProblem:
+        chosen = freedom.select(q)
         return problem if chosen == places else problem_along(chosen)
 
-    return problem_along(freedom.chosen(q))
+    return problem_along(freedom.select(q))
 
 
 def _coordinates_of_speeds(model: CompiledScene, free: list[int]) -> NDArray[np.int64] | None:
     """Indices in q of the coordinates whose rates are the free speeds; None for other hinges."""
     places = np.zeros(model.nu, dtype=np.int64)
-    for slots in model.layout.hinges.values():
-        if slots.nu and not slots.straight:
+    for slots in model.coordinate_layout.hinges.values():
+        if slots.nu and not slots.rates_are_speeds:
             return None
         places[slots.u_slice] = np.arange(slots.q, slots.q + slots.nq)
-    for slots in model.layout.modal.values():
+    for slots in model.coordinate_layout.modal.values():
         places[slots.u_slice] = np.arange(slots.q, slots.q + slots.nq)
     return np.asarray(places[free])

@@ -39,9 +39,9 @@ def remove_full_turns(model: CompiledScene, start: Array, q: Array, t: float) ->
 
 def _wound_coordinates(model: CompiledScene, start: Array, q: Array) -> Iterator[int]:
     """Indices in q of angles more than half a turn from the start that nothing reads by name."""
-    free, referenced = set(model.free_speeds), None
-    for name, slots in model.layout.hinges.items():
-        if not slots.nu or not slots.straight:
+    free, referenced = set(model.free_speed_indices), None
+    for name, slots in model.coordinate_layout.hinges.items():
+        if not slots.nu or not slots.rates_are_speeds:
             continue
         for k, unit in enumerate(slots.u_units):
             index = slots.q + k
@@ -60,7 +60,7 @@ def _referenced_hinges(model: CompiledScene) -> set[str]:
         names_read |= {name.text.rpartition(".")[0] for name in active.expression.names}
         names_read |= {scene.hinges[number].name for number in active.hinges}
     texts = [repr(x) for x in (*scene.output, *scene.controller, *scene.coupling)]
-    names = model.layout.hinges
+    names = model.coordinate_layout.hinges
     return names_read | {name for name in names if any(f"{name}." in text for text in texts)}
 
 

@@ -38,7 +38,7 @@ class KinematicQueries(CompiledScene):
         All queries raise SceneError for a wrong shape and for an unknown body or end, with the
         nearest name.
         """
-        points = self._kinematics.call("places", of)(q)
+        points = self._kinematics.prepared_call("places", of)(q)
         if points is None:
             points = self._points(q, of)[..., POINT_COLUMNS["position"]]
         return copy_to(out, points)
@@ -48,7 +48,7 @@ class KinematicQueries(CompiledScene):
 
         From the axes of the body or end, at q (..., nq).
         """
-        single: Array | None = self._kinematics.call("poses", of)(q)
+        single: Array | None = self._kinematics.prepared_call("poses", of)(q)
         if single is not None:
             return copy_to(out, single)
         points = self._points(q, of)
@@ -60,25 +60,25 @@ class KinematicQueries(CompiledScene):
 
     def _points(self, q: ArrayLike, of: Names) -> Array:
         lead, (states,) = batch(("q", q, self.nq))
-        return self._reshape(lead, of, self._kinematics.still(of, states))
+        return self._reshape(lead, of, self._kinematics.points_at_rest(of, states))
 
     def velocities(
         self, q: ArrayLike, u: ArrayLike, of: Names, *, out: Array | None = None
     ) -> Array:
         """Velocity (m/s), then angular velocity (rad/s), (..., 6), at q (..., nq), u (..., nu)."""
-        twists = self._kinematics.call("velocities", of)(q, u)
+        twists = self._kinematics.prepared_call("velocities", of)(q, u)
         if twists is None:
             lead, states = batch(("q", q, self.nq), ("u", u, self.nu))
-            twists = self._reshape(lead, of, self._kinematics.moving(of, *states))
+            twists = self._reshape(lead, of, self._kinematics.velocities(of, *states))
         return copy_to(out, twists)
 
     def jacobian(self, q: ArrayLike, of: Names, *, out: Array | None = None) -> Array:
         """Jacobian J (..., 6, nu) with `velocities` = J u; that of the tree with closed loops."""
-        single: Array | None = self._kinematics.call("jacobian", of)(q)
+        single: Array | None = self._kinematics.prepared_call("jacobian", of)(q)
         if single is not None:
             return copy_to(out, single)
         lead, (states,) = batch(("q", q, self.nq))
-        matrices = self._kinematics.each("jacobian", of, self._kinematics.jacobian, states)
+        matrices = self._kinematics.evaluate_rows("jacobian", of, self._kinematics.jacobian, states)
         return copy_to(out, self._reshape(lead, of, matrices))
 
     def jacobian_rate(
@@ -88,11 +88,13 @@ class KinematicQueries(CompiledScene):
 
         Acceleration and angular acceleration are J udot + (dJ/dt) u.
         """
-        single: Array | None = self._kinematics.call("jacobian_rate", of)(q, u)
+        single: Array | None = self._kinematics.prepared_call("jacobian_rate", of)(q, u)
         if single is not None:
             return copy_to(out, single)
         lead, (states, speeds) = batch(("q", q, self.nq), ("u", u, self.nu))
-        matrices = self._kinematics.each("jacobian_rate", of, self._jacobian_rate, states, speeds)
+        matrices = self._kinematics.evaluate_rows(
+            "jacobian_rate", of, self._jacobian_rate, states, speeds
+        )
         return copy_to(out, self._reshape(lead, of, matrices))
 
     def _jacobian_rate(self, of: Names, q: Array, u: Array) -> Array:
@@ -112,7 +114,7 @@ class KinematicQueries(CompiledScene):
             total = np.asarray(self._observe_sums(q, u, t)[..., SUMS["energy"][2]].sum(axis=-1))
         return copy_to(out, total)
 
-    def energies(self, q: ArrayLike, u: ArrayLike, t: ArrayLike = 0.0) -> dict[str, Array]:
+    def energy_components(self, q: ArrayLike, u: ArrayLike, t: ArrayLike = 0.0) -> dict[str, Array]:
         """Parts of `energy` by name, (...) each in J: kinetic, gravity, springs."""
         sums = self._observe_sums(q, u, t)
         return {
@@ -148,19 +150,19 @@ class KinematicQueries(CompiledScene):
         if self._has_rate_speeds:
             return copy_to(out, (states + speeds * times[:, None]).reshape(*lead, self.nq))
         given = zip(states, speeds, times.tolist(), strict=True)
-        rows = [self._move(*state) for state in given]
+        rows = [self._advance(*state) for state in given]
         return copy_to(out, np.array(rows).reshape(*lead, self.nq))
 
-    def _move(self, q: Array, u: Array, dt: float) -> Array:
+    def _advance(self, q: Array, u: Array, dt: float) -> Array:
         for first in self._quaternions:
             q[first : first + 4] /= np.linalg.norm(q[first : first + 4])
-        engine = self.looped.inertia_alone
+        engine = self.looped.inertia_only
         rates = engine.rates(0.0, q, u, engine.start_memory())
         return move_steadily(q, rates, dt, self._quaternions)
 
     @cached_property
     def _quaternions(self) -> list[int]:
-        return [int(k) for group in self.layout.groups for k in group.quaternions()]
+        return [int(k) for group in self.coordinate_layout.groups for k in group.quaternions()]
 
     def _observe_sums(self, q: ArrayLike, u: ArrayLike, t: ArrayLike) -> Array:
         lead, given = batch(("t", t, None), ("q", q, self.nq), ("u", u, self.nu))
@@ -175,14 +177,16 @@ class KinematicQueries(CompiledScene):
         """Rate of tangent increments per increment (nu, nu); None if rates are the speeds."""
         if self._has_rate_speeds:
             return None
-        if not self._steady:
-            return self._differentiation(()).turning(q, u)
+        if not self._has_constant_subspaces:
+            return self._differentiation(()).rate_matrix(q, u)
         return np.tensordot(u[self._quasi_speeds], self._brackets, 1)
 
     @cached_property
     def _quasi_speeds(self) -> list[int]:
         """Indices of speeds that are not rates of coordinates."""
-        hinges = (hinge for hinge in self.layout.hinges.values() if not hinge.straight)
+        hinges = (
+            hinge for hinge in self.coordinate_layout.hinges.values() if not hinge.rates_are_speeds
+        )
         return [place for hinge in hinges for place in range(hinge.u, hinge.u + hinge.nu)]
 
     @cached_property
@@ -191,13 +195,13 @@ class KinematicQueries(CompiledScene):
         q, units = np.zeros(self.nq), np.eye(self.nu)[self._quasi_speeds]
         q[self._quaternions] = 1.0
         differentiation = self._differentiation(())
-        return np.array([differentiation.turning(q, unit) for unit in units])
+        return np.array([differentiation.rate_matrix(q, unit) for unit in units])
 
     def _bracket_entries(self) -> Brackets | None:
         """Entries (speed, row, column, value) of `_brackets`; None if they depend on q."""
         if self._has_rate_speeds:
             return []
-        if not self._steady:
+        if not self._has_constant_subspaces:
             return None
         indices = np.argwhere(self._brackets).tolist()
         return [
@@ -205,12 +209,15 @@ class KinematicQueries(CompiledScene):
         ]
 
     @cached_property
-    def _steady(self) -> bool:
-        return all(hinge.straight or hinge.steady for hinge in self.layout.hinges.values())
+    def _has_constant_subspaces(self) -> bool:
+        return all(
+            hinge.rates_are_speeds or hinge.constant_subspace
+            for hinge in self.coordinate_layout.hinges.values()
+        )
 
     @cached_property
     def _has_rate_speeds(self) -> bool:
-        return all(hinge.straight for hinge in self.layout.hinges.values())
+        return all(hinge.rates_are_speeds for hinge in self.coordinate_layout.hinges.values())
 
     def _differentiation(self, names: tuple[str, ...]) -> Differentiation:
         differentiation = self._differentiations.get(names)

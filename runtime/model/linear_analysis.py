@@ -16,7 +16,7 @@ from .state_dynamics import DynamicsQueries
 if TYPE_CHECKING:
     from ..linear.frequency_response import FrequencyResponse
     from ..linear.harmonic.dynamic_stiffness_modes import DynamicStiffnessModes
-    from ..linear.harmonic.exact_beams import Chosen
+    from ..linear.harmonic.exact_beams import BeamSelection
     from ..linear.harmonic.hysteretic_damping import Losses
     from ..linear.harmonic.modal_damping import Ratios
     from ..linear.linear_model import Linear
@@ -92,18 +92,14 @@ class LinearAnalysis(DynamicsQueries):
         """
         return self.linearize(q, u, t, friction=friction).modes(count, damped)
 
-    def exact_modes(
-        self,
-        count: int,
-        exact: Chosen = True,
-        q: ArrayLike | None = None,
-        t: float = 0.0,
+    def dynamic_stiffness_modes(
+        self, count: int, exact: BeamSelection = True, q: ArrayLike | None = None, t: float = 0.0
     ) -> DynamicStiffnessModes:
         """The `count` slowest undamped modes at rest, with the dynamic stiffness of beams.
 
         `exact` True for all beams, or the names of some.  See `Linear.exact_modes`.
         """
-        return self.linearize(q, None, t).exact_modes(count, exact)
+        return self.linearize(q, None, t).dynamic_stiffness_modes(count, exact)
 
     def frequency_response(
         self,
@@ -115,7 +111,7 @@ class LinearAnalysis(DynamicsQueries):
         *,
         structural: Losses = 0.0,
         modal: Ratios = 0.0,
-        exact: Chosen = False,
+        exact: BeamSelection = False,
         friction: Amplitudes = None,
         u: ArrayLike | None = None,
     ) -> FrequencyResponse:
@@ -128,7 +124,7 @@ class LinearAnalysis(DynamicsQueries):
             omega, inputs, outputs, structural=structural, modal=modal, exact=exact
         )
 
-    def locus(
+    def root_locus(
         self,
         parameter: str,
         values: ArrayLike,
@@ -188,7 +184,7 @@ class LinearAnalysis(DynamicsQueries):
             self._linear_model_at(parameter, inputs=()), parameter, speeds, at, unbalance, observed
         )
 
-    def critical(
+    def stability_limit(
         self, parameter: str, stable: float, unstable: float, *, friction: Amplitudes = None
     ) -> StabilityLimit:
         """Parameter value at the stability limit, such as a buckling load or flutter speed.

@@ -15,9 +15,9 @@ from mstmm.errors import NumericalFailure
 from ..engine.characteristic_scales import speed_scales
 from ..linear.input_channels import GROUND, Channel, input_channels, inputs_of
 from ..linear.linear_model import Linear
-from ..linear.loops.constrained_linearisation import mechanism_at, moving_at
+from ..linear.loops.constrained_linearisation import mechanism_at, mechanism_in_motion
 from ..linear.mck_matrices import State, matrices
-from ..linear.nonholonomic.admissible import has_speed_rows
+from ..linear.nonholonomic.admissible_perturbations import has_speed_rows
 from ..linear.nonholonomic.linear_model import nonholonomic_at
 from ..linear.operating_point.friction import Amplitudes, dry_friction
 from ..linear.validity import is_unsteady
@@ -45,13 +45,13 @@ class Lineariser:
 
     def __init__(self, model: CompiledScene) -> None:
         self._model = model
-        system, layout = model.packed.system, model.layout
+        system, layout = model.packed_scene.system, model.coordinate_layout
         twists = any(law.twist >= 0 for law in system.laws)
         #: Whether any given state is consistent, without drives, loops or unit quaternions.
         self._is_consistent = not (
-            len(layout.quaternions) or system.driven or twists or system.closes
+            len(layout.quaternions) or system.driven or twists or system.has_loops
         )
-        self._has_rate_speeds = all(h.straight for h in layout.hinges.values() if h.nu)
+        self._has_rate_speeds = all(h.rates_are_speeds for h in layout.hinges.values() if h.nu)
 
     def __call__(
         self,
@@ -72,30 +72,32 @@ class Lineariser:
         q, u = self._operating_point(q, u, t)
         at_speeds = None if is_given else partial(self._at_speed, q, t)
         model, equations, dry = self._model, None, dry_friction(self._model, u, friction)
-        if model.freedom is None and not dry:
-            equations = model.slopes.at(t, q, u)
+        if model.independent_speeds is None and not dry:
+            equations = model.compiled_linearisation.evaluate(t, q, u)
         if equations is not None:
             turning = None if self._has_rate_speeds or not u.any() else equations.G
             state = State(t, q, u, equations.a)
             channels = v_channels, w_channels
-            return Linear(model, state, *channels, turning, equations, at_speeds=at_speeds)
+            return Linear(
+                model, state, *channels, turning, equations, equations_at_speeds=at_speeds
+            )
         state = State(t, q, u, self._accelerations(t, q, u))
-        bare = Linear(model, state, v_channels, w_channels, dry=dry, at_speeds=at_speeds)
-        if model.freedom is not None:
+        bare = Linear(model, state, v_channels, w_channels, dry=dry, equations_at_speeds=at_speeds)
+        if model.independent_speeds is not None:
             return self._mechanism_model(bare)
-        return replace(bare, turning=self._rate_matrix(state))
+        return replace(bare, rate_matrix=self._rate_matrix(state))
 
     def _mechanism_model(self, bare: Linear) -> Linear:
         model, state, dry = self._model, bare.state, bare.dry
         if state.u.any() and has_speed_rows(model):
             return nonholonomic_at(bare, self._acceleration_slopes)
         if not state.u.any():
-            linear = replace(bare, mechanism=mechanism_at(model, state, dry))
+            linear = replace(bare, constrained_motion=mechanism_at(model, state, dry))
             if not is_unsteady(linear):
                 return linear
-        loops = moving_at(model, state, self._acceleration_slopes, dry=dry)
-        turning = None if loops is None else loops.turning
-        return replace(bare, turning=turning, mechanism=loops)
+        loops = mechanism_in_motion(model, state, self._acceleration_slopes, dry=dry)
+        turning = None if loops is None else loops.rate_matrix
+        return replace(bare, rate_matrix=turning, constrained_motion=loops)
 
     def _at_speed(self, q: Array, t: float, u: Array) -> Linear:
         """Linear model about the same q with speeds u (nu,), without inputs."""
@@ -131,13 +133,13 @@ class Lineariser:
         model = self._model
         if self._has_rate_speeds or not state.u.any():
             return None
-        matrix = self._differentiation.turning(state.q, state.u, state.t)
-        return np.asarray(matrix[np.ix_(model.free_speeds, model.free_speeds)])
+        matrix = self._differentiation.rate_matrix(state.q, state.u, state.t)
+        return np.asarray(matrix[np.ix_(model.free_speed_indices, model.free_speed_indices)])
 
     def _acceleration_slopes(self, state: State) -> dict[str, Array]:
         """Exact derivatives of the accelerations by the names of `Derivatives`."""
         of = np.array([[state.t]]), state.q[None], state.u[None], np.zeros((1, self._model.nu))
-        return {name: found[0] for name, found in self._differentiation.at(*of).items()}
+        return {name: found[0] for name, found in self._differentiation.evaluate(*of).items()}
 
     @cached_property
     def _differentiation(self) -> Differentiation:
@@ -152,7 +154,7 @@ def _equilibrium_or_start(model: CompiledScene, t: float) -> Array:
     except NumericalFailure as failure:
         q = SceneSystem(model.looped).start(t, start, np.zeros(model.nu))
         if not _is_at_rest(model, q[: model.nq], t):
-            if speeds[list(model.free_speeds)].any():
+            if speeds[list(model.free_speed_indices)].any():
                 raise NumericalFailure(f"{failure}; {_START_REMEDY}") from None
             raise
         return q[: model.nq]
@@ -160,12 +162,12 @@ def _equilibrium_or_start(model: CompiledScene, t: float) -> Array:
 
 def _is_at_rest(model: CompiledScene, q: Array, t: float) -> bool:
     """Whether the residual efforts of a state are rounding, relative to its stiffness."""
-    free, zeros, engine = list(model.free_speeds), np.zeros(model.nu), model.looped
+    free, zeros, engine = list(model.free_speed_indices), np.zeros(model.nu), model.looped
     state = State(t, q, zeros, zeros)
     efforts = engine.inverse_dynamics(t, q, zeros, zeros, engine.start_memory())
     loops = mechanism_at(model, state)
     if loops is not None:
-        free, missing = list(loops.places), loops.ways.T @ efforts
+        free, missing = list(loops.independent_indices), loops.motion_basis.T @ efforts
         stiffness = loops.matrices(loops.tree, state).K
     else:
         missing, stiffness = efforts[free], matrices(engine, state, free).K

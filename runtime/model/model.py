@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
-from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,10 +15,13 @@ from mstmm.array_validation import Array, batch, finite_float, integer, single_s
 from mstmm.defaults import ATOL, METHOD, RTOL
 from mstmm.errors import NumericalFailure
 from mstmm.notebook_html import NotebookDisplay, table
+from mstmm.public_members import PublicMembers
 from mstmm.risk import Risk
 
 from ..engine.input_values import InputValue
+from ..integrate.methods import Method, to_method
 from ..integrate.settings import Settings, to_output_times, validate
+from .execution import Execution, check_execution
 from .linear_analysis import LinearAnalysis
 
 if TYPE_CHECKING:
@@ -31,26 +33,48 @@ if TYPE_CHECKING:
     from .assembly import Assembly
     from .equilibrium import Equilibrium
     from .session import Session
+    from .target_error.error_request import ErrorRequest
 
 
-class Model(LinearAnalysis, NotebookDisplay):
+class Model(LinearAnalysis, PublicMembers, NotebookDisplay):
     """Compiled scene; created by `mstmm.compile`.
 
-    `q` and `u` hold the hinges in the scene's order (`layout`); SI units and radians; speeds and
-    quaternions of ball and free hinges in outboard axes, quaternions w, x, y, z.
+    `q` and `u` hold the hinges in the scene's order (`coordinate_layout`); SI units and radians;
+    speeds and quaternions of ball and free hinges in outboard axes, quaternions w, x, y, z.
+
+    Attributes:
+        scene: the scene.
+        sweep: sweep in use, "riccati", "refined", "qr" or "product".
     """
+
+    member_groups: ClassVar[Mapping[str, str]] = {
+        "Description": "scene nq nu coordinate_layout parameters loops flexible_bodies "
+        "free_speed_indices simplifications engine engine_reason sweep",
+        "States": "initial_state assemble assemble_path equilibrium integrate tangent_increments",
+        "Dynamics": "accelerations solve mass_matrix bias_efforts gravity_efforts inverse_dynamics "
+        "derivatives energy energy_components momentum",
+        "Kinematics": "positions poses velocities jacobian jacobian_rate",
+        "Simulation": "simulate simulate_batch session",
+        "Linear analysis": "linearize modes dynamic_stiffness_modes frequency_response root_locus "
+        "stability_limit waterfall unbalance_response",
+        "Copies with other values": "with_inputs with_parameters",
+    }
 
     def __repr__(self) -> str:
         return f"<Model: {self.scene.summary}, {self._mobility} degrees of freedom; {self.engine}>"
 
     def _repr_html_(self) -> str:
-        rows = [("degrees of freedom", self._mobility), ("engine", self.engine_choice)]
+        rows = [("degrees of freedom", self._mobility), ("engine", self.engine_reason)]
         return table(rows) + self.scene._repr_html_()
 
     @property
     def _mobility(self) -> int:
         """Number of degrees of freedom: free speeds, less those that loops constrain."""
-        return len(self.free_speeds) if self.closed is None else self.closed.loops.mobility
+        return (
+            len(self.free_speed_indices)
+            if self.loop_start is None
+            else self.loop_start.loops.mobility
+        )
 
     def initial_state(self) -> tuple[Array, Array]:
         """Initial state (q, u) of the scene at t = 0, with driven coordinates."""
@@ -69,21 +93,23 @@ class Model(LinearAnalysis, NotebookDisplay):
         """Closed-loop analysis: cut hinges, constraint rows, redundant rows, mobility."""
         from ..engine.loops.loop_analysis import LoopAnalysis
 
-        if self.closed is None:
+        if self.loop_start is None:
             return LoopAnalysis()
         return replace(
-            self.closed.loops,
-            decided_by=self._independent_speed_names,
-            found_by=self._find_branches,
+            self.loop_start.loops,
+            speed_choice=self._independent_speed_names,
+            find_branches=self._find_branches,
         )
 
     def _find_branches(self) -> tuple[Branch, ...]:
-        assert self.closed is not None
-        return self.closed.branches
+        assert self.loop_start is not None
+        return self.loop_start.branches
 
     def _independent_speed_names(self) -> tuple[str, ...]:
-        assert self.freedom is not None
-        return tuple(self.layout.u_name(place) for place in self.freedom.places)
+        assert self.independent_speeds is not None
+        return tuple(
+            self.coordinate_layout.u_name(place) for place in self.independent_speeds.indices
+        )
 
     def assemble(
         self,
@@ -112,7 +138,9 @@ class Model(LinearAnalysis, NotebookDisplay):
         initial, remedy = self.initial_state(), "assemble takes one state; see assemble_path"
         target_q = initial[0] if q is None else single_state("q", q, self.nq, remedy)
         target_u = initial[1] if u is None else single_state("u", u, self.nu, remedy)
-        moving_hinges = self.closed.fast if u is None and self.closed is not None else None
+        moving_hinges = (
+            self.loop_start.fast_hinges if u is None and self.loop_start is not None else None
+        )
         return assemble(
             self,
             target_q,
@@ -137,13 +165,13 @@ class Model(LinearAnalysis, NotebookDisplay):
         rows = batch(("q", q, self.nq))[1][0]
         return assemble_path(self, rows, hold, branch)
 
-    def refuse_undetermined_start(self) -> None:
+    def check_start_determined(self) -> None:
         """Raise SceneError, naming the hinges, if motions at the start have no inertia."""
-        from .undetermined_start import refuse_undetermined_start
+        from .undetermined_start import check_start_determined
 
-        refuse_undetermined_start(self, *self.initial_state())
+        check_start_determined(self, *self.initial_state())
 
-    def refuse_unknown_outputs(self) -> None:
+    def check_outputs(self) -> None:
         """Raise SceneError for outputs and controller measurements that results do not have."""
         if self.scene.output or self.scene.controller:
             from ..result.scene_outputs import quantity_of
@@ -180,7 +208,7 @@ class Model(LinearAnalysis, NotebookDisplay):
         the state at rest.
         """
         from .equilibrium import equilibrium
-        from .lasting import check_lasting
+        from .equilibrium_persistence import with_persistence_findings
 
         remedy = "call equilibrium for each of several"
         start = self.initial_state()[0] if q is None else single_state("q", q, self.nq, remedy)
@@ -188,38 +216,29 @@ class Model(LinearAnalysis, NotebookDisplay):
         step_limit = integer("max_steps", max_steps, 1, "a number of steps from 1 on")
         state = equilibrium(self, start, t, tolerance, step_limit, progress)
         linearise = partial(self.linearize, np.asarray(state), None, t, inputs=(), disturbances=())
-        return check_lasting(self, state, t, linearise)
+        return with_persistence_findings(self, state, t, linearise)
 
     def simulate(
         self,
         t_end: float,
-        method: str | None = None,
+        method: str | Method | None = None,
         step: float | None = None,
         rtol: float | None = None,
         atol: float | None = None,
         output_times: ArrayLike | Sequence[float] | None = None,
         *,
-        error: float | None = None,
-        error_of: str | Sequence[str] = (),
-        t_start: float = 0.0,
         initial: tuple[ArrayLike, ArrayLike] | None = None,
         inputs: Mapping[str, InputValue] | None = None,
-        max_step: float = 0.0,
-        max_steps: int = 0,
-        radius: float | None = None,
-        scheme: str = "",
-        iterations: int = 1,
-        tangent: str = "auto",
+        error: float | ErrorRequest | None = None,
         certify: bool = False,
-        on_risk: str = "warn",
-        progress: Callable[[float, float], None] | None = None,
-        checkpoint: str | Path | None = None,
-        resume: bool = False,
+        t_start: float = 0.0,
+        execution: Execution | None = None,
     ) -> Result:
         """Simulate to `t_end` (s).
 
         Args:
-            method: rk4 (with `step`), dopri5, dop853, pirk13 (order 13, for smooth motions on fused
+            method: name of a method, or an object of `mstmm.methods` with options of its own.
+                rk4 (with `step`), dopri5, dop853, pirk13 (order 13, for smooth motions on fused
                 code); auto, which is dop853 until stability sets its steps, then rodas4p2 (rtol
                 from 1e-5 on) or rodas5p, and back; for stiff motion rodas4p2, rodas5p, rodas4,
                 ros34pw2, rodas4pw, esdirk436, kvaerno5, genalpha, dttmm, hht, newmark, wilson or
@@ -233,33 +252,16 @@ class Model(LinearAnalysis, NotebookDisplay):
             step: fixed step in s; otherwise `rtol` (1e-9) and `atol` (1e-12) control the step.
             output_times: times of the samples (s, increasing), a lone whole number excepted;
                 otherwise every accepted step (with an error 201 samples).
-            error: target error of the whole run, instead of tolerances: in rad, and of other
-                coordinates relative to the largest excursion of their unit.  Several runs find the
-                tolerance; `Result.error_estimate` is the achieved error.
-            error_of: names of quantities of the target error, instead of all coordinates: one in
-                its unit, several relative to the excursion of each.
-            t_start: start time in s for drives, loads and signals.
-            max_step, max_steps: longest step in s and largest number of steps; 0 for no limit.
-            radius: spectral radius, 0 to 1, that genalpha and dttmm leave to infinitely fast motion
-                (0.8); below 1 with genalpha-index3.
-            scheme, iterations: of dttmm-classical; generalised-alpha, hht, newmark or wilson, with
-                a number as in "hht:0.3", and how many linear solutions a step may take.
-            tangent: of the equations of motion, for implicit methods: exact; laws, inertia and the
-                slopes of hinges' laws alone, for those that do without the exact one (ros34pw2,
-                rodas4pw, and methods that iterate); auto, exact but where iterations may begin
-                with laws.
             initial: (q, u) instead of the initial state of the scene.
             inputs: inputs of the scene in this run by name, as in `with_inputs`: numbers, names of
                 signals, (times, values), or the keys of a [[signal]].
+            error: target error of the whole run, instead of tolerances: in rad, and of other
+                coordinates relative to the largest excursion of their unit; of other quantities as
+                an `ErrorRequest`.  Several runs find the tolerance; `Result.achieved_error` is the
+                error.
             certify: estimate the error by a second, more accurate run.
-            on_risk: action on objections to the result (`Result.risks`): warn, in the result;
-                refuse, which raises RiskRefused, before the run if known by then, else after it
-                with the result; ignore, which leaves `warnings` empty.
-            progress: called with (t, t_end) about every 0.1 s.  An exception that it raises ends
-                the run and is raised here; a checkpoint is written before.
-            checkpoint: file with the state of the run, written every 30 s, on interruption, and at
-                the end, until the result is saved.
-            resume: continue from that file, if it exists, bit for bit.
+            t_start: start time in s for drives, loads and signals.
+            execution: reaction to risks, progress calls, checkpoint and resumption.
 
         Returns a Result, also after a failure: `success`, `message` and everything computed so far.
         Raises SceneError for invalid settings, RiskRefused with on_risk = "refuse".
@@ -268,16 +270,17 @@ class Model(LinearAnalysis, NotebookDisplay):
         from .run_results import simulate
         from .target_error.error_request import Control, parse_error_request
 
+        run = check_execution(execution)
         model = self if inputs is None else self.with_inputs(inputs)
-        certify, resume = require_bool("certify", certify), require_bool("resume", resume)
-        given = Control(method, step, rtol, atol)
-        request = parse_error_request(error, error_of, given, checkpoint is not None or resume)
-        method, rtol, atol = given.filled()
+        certify, resume = require_bool("certify", certify), run.resume
+        chosen = None if method is None else to_method(method)
+        given = Control(None if chosen is None else chosen.name or None, step, rtol, atol)
+        request = parse_error_request(error, given, run.checkpoint is not None or resume)
+        name, rtol, atol = given.with_defaults()
         settings = validate(
             Settings(
-                t_end, t_start, method, step, rtol, atol, to_output_times(output_times), max_step,
-                max_steps, radius=radius, scheme=scheme, iterations=iterations,
-                tangent=tangent,
+                t_end, t_start, name, step, rtol, atol, to_output_times(output_times),
+                **({} if chosen is None else chosen.options),
             )
         )  # fmt: skip
         q, u = model.initial_state() if initial is None else split_state("initial", initial)
@@ -286,59 +289,46 @@ class Model(LinearAnalysis, NotebookDisplay):
             single_state("initial q", q, self.nq, remedy),
             single_state("initial u", u, self.nu, remedy),
         )
-        seen = check_start(model, settings, q, u, on_risk)
+        seen = check_start(model, settings, q, u, run.on_risk)
         if request is not None:
             from .target_error import tolerance_search
 
             result = tolerance_search.simulate(
-                model, settings, request, q, u, seen=seen, certify=certify, progress=progress
+                model, settings, request, q, u, seen=seen, certify=certify, progress=run.progress
             )
         else:
             result = simulate(
-                model, settings, q, u, seen=seen, certify=certify, progress=progress,
-                checkpoint=checkpoint, resume=resume, named=given.method is not None,
+                model, settings, q, u, seen=seen, certify=certify, progress=run.progress,
+                checkpoint=run.checkpoint, resume=resume, named=given.method is not None,
             )  # fmt: skip
-        return apply_policy(result, on_risk)
+        return apply_policy(result, run.on_risk)
 
     def session(
         self,
         q: ArrayLike | None = None,
         u: ArrayLike | None = None,
         t: float = 0.0,
-        method: str | None = None,
+        method: str | Method = METHOD,
         step: float | None = None,
-        rtol: float | None = None,
-        atol: float | None = None,
-        *,
-        max_step: float = 0.0,
-        radius: float | None = None,
-        tangent: str = "auto",
+        rtol: float = RTOL,
+        atol: float = ATOL,
     ) -> Session:
         """Start a run that the caller advances: `session.advance(dt, inputs={...})`.
 
-        From q (nq,) and u (nu,), by default the start of the scene, at t (s).  method, step, rtol,
-        atol, max_step, radius and tangent as in `simulate`, except the methods auto, of SciPy, of
-        SUNDIALS and the classical ones, which only make whole runs.  A fixed step is checked once
-        per model and step; objections are in `warnings` of every such session.
+        From q (nq,) and u (nu,), by default the start of the scene, at t (s).  method, step, rtol
+        and atol as in `simulate`, except the methods auto, of SciPy, of SUNDIALS and the classical
+        ones, which only make whole runs.  A fixed step is checked once per model and step;
+        objections are in `warnings` of every such session.
 
         Raises SceneError for invalid settings or an invalid state.
         """
         from .session import Session
 
         t_start = finite_float("t", t, "a time in s")
-        method_name = METHOD if method is None else method
-        tolerances = RTOL if rtol is None else rtol, ATOL if atol is None else atol
+        chosen = to_method(method)
         settings = validate(
             Settings(
-                t_start,
-                t_start,
-                method_name,
-                step,
-                *tolerances,
-                (),
-                max_step,
-                radius=radius,
-                tangent=tangent,
+                t_start, t_start, chosen.name or METHOD, step, rtol, atol, (), **chosen.options
             )
         )
         start, remedy = self.initial_state(), "make a session for each of several"
@@ -371,15 +361,11 @@ class Model(LinearAnalysis, NotebookDisplay):
         t_end: float,
         inputs: Mapping[str, BatchInput] | None = None,
         output_times: ArrayLike | Sequence[float] | None = None,
-        method: str = METHOD,
+        method: str | Method = METHOD,
         step: float | None = None,
         rtol: float = RTOL,
         atol: float = ATOL,
         t_start: float = 0.0,
-        max_step: float = 0.0,
-        max_steps: int = 0,
-        radius: float | None = None,
-        tangent: str = "auto",
         threads: int | None = None,
     ) -> BatchResult:
         """Simulate n independent trajectories to `t_end` (s).
@@ -391,8 +377,8 @@ class Model(LinearAnalysis, NotebookDisplay):
                 values) and the keys of a [[signal]] with values (n, m).
             output_times: times of the samples (s, increasing); otherwise `t_end` alone.
             threads: by default the number of processors.
-            method, step, rtol, atol, t_start, max_step, max_steps, radius, tangent: as in
-                `simulate`; the method auto chooses for each trajectory.
+            method, step, rtol, atol, t_start: as in `simulate`; the method auto chooses for each
+                trajectory.
 
         Trajectories run on several threads, and in vector lanes with explicit methods if the scene
         has no events, releases, twist springs and drives.  Each trajectory is bit for bit
@@ -404,18 +390,9 @@ class Model(LinearAnalysis, NotebookDisplay):
         from ..result.batch_result import BatchResult
         from ..run.batch.batch_run import prepare_batch, simulate_batch
 
+        chosen, times = to_method(method), to_output_times(output_times)
         settings = Settings(
-            t_end,
-            t_start,
-            method,
-            step,
-            rtol,
-            atol,
-            to_output_times(output_times),
-            max_step,
-            max_steps,
-            radius=radius,
-            tangent=tangent,
+            t_end, t_start, chosen.name or METHOD, step, rtol, atol, times, **chosen.options
         )
         settings, q, u = prepare_batch(self, settings, initial_states)
         run = simulate_batch(

@@ -120,8 +120,8 @@ def _with_missing_memory(model: Model, run: Trajectory) -> Trajectory:
     Until 2026-11-24: whether a step of a scene with loops ended near a singular pose; until
     2026-11-29: which rows are at rest.  Older runs did not depend on them.
     """
-    system, rows = model.packed.system, run.memory
-    missing = [system.strained] * (system.strained >= 0), [*system.chosen]
+    system, rows = model.packed_scene.system, run.memory
+    missing = [system.strain_index] * (system.strain_index >= 0), [*system.inactive_row_indices]
     for places in (missing[1], missing[0] + missing[1]):
         if places and rows.ndim == 2 and rows.shape[1] == system.n_memory - len(places):
             extended = np.zeros((len(rows), system.n_memory))
@@ -130,13 +130,13 @@ def _with_missing_memory(model: Model, run: Trajectory) -> Trajectory:
     return run
 
 
-def _fits(model: Model, run: Trajectory) -> bool:
+def _has_valid_sizes(model: Model, run: Trajectory) -> bool:
     """Whether all arrays of a run have the sizes that the scene and the samples imply."""
-    n, memory = len(run.t), model.packed.system.n_memory
+    n, memory = len(run.t), model.packed_scene.system.n_memory
     expected = {
         "q": (n, model.nq), "u": (n, model.nu), "memory": (n, memory), "work": (n,), "event": (n,),
     }  # fmt: skip
-    states = [run.last[1:] if run.last is not None else None, run.start]
+    states = [run.last_state[1:] if run.last_state is not None else None, run.start]
     states_fit = all(
         (q.shape, u.shape) == ((model.nq,), (model.nu,)) for q, u in filter(None, states)
     )
@@ -154,7 +154,7 @@ def _rebuild_result(data: Any, path: Path) -> Result:
     model = Model(scene, known=elements, sweep=data.attrs.get("sweep", "riccati"))
     model.fusion = NoFusedCode(f"the saved run was made by the {data.attrs['engine']} one")
     run = _with_missing_memory(model, provenance.read_trajectory(data))
-    if not _fits(model, run):
+    if not _has_valid_sizes(model, run):
         raise SceneError(f'result file "{path}": its states do not fit its scene')
     if data.attrs["kernels_sha256"] != kernels_hash(model.known):
         note = "saved with other kernels: quantities beyond q and u come from the present ones"

@@ -41,7 +41,7 @@ def simulate(
         path = require_path("checkpoint", checkpoint)
         monitor.checkpoint = Checkpoint(path, model, settings, q, u)
     run = first_run(model, settings, q, u, monitor, resume)
-    run = seen.given(run, q, u)
+    run = seen.attach_to(run, q, u)
     error = second_run(model, run, q, u, monitor) if certify and run.is_comparable else None
     if monitor.notes:
         run = replace(run, notes=(*run.notes, *monitor.notes))

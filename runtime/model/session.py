@@ -6,12 +6,13 @@ import math
 from collections.abc import Mapping, Sequence
 from copy import copy as shallow
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Never, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Never, Self
 
 import numpy as np
 
 from mstmm.array_validation import Array, finite_float, mapping_by_name
 from mstmm.errors import NumericalFailure, SceneError
+from mstmm.public_members import PublicMembers
 from mstmm.risk import Risk, sentences
 from mstmm.scene.validators.validation_messages import did_you_mean
 
@@ -43,7 +44,7 @@ _LOOKAHEAD_TICKS = 64.0
 _CHECKED_STEPS = 1000
 
 
-class Session:
+class Session(PublicMembers):
     """A run that the caller advances; created by `Model.session`.
 
     `advance` integrates over a tick with given inputs, which stay constant until changed.  With
@@ -57,6 +58,12 @@ class Session:
         settings: method and steps.
     """
 
+    member_groups: ClassVar[Mapping[str, str]] = {
+        "State": "t q u state model settings",
+        "Advance": "advance inputs stop_reason copy",
+        "Results": "outputs result risks warnings",
+    }
+
     def __init__(
         self,
         model: CompiledScene,
@@ -66,13 +73,13 @@ class Session:
         risks: tuple[Risk, ...] = (),
     ) -> None:
         check_method(settings)
-        reject_one_way(model.packed, "a session")
+        reject_one_way(model.packed_scene, "a session")
         self.model, self.settings, self._risks = model, settings, risks
         self._names = settable_inputs(model)
-        self._packed = with_held_inputs(model.packed, self._names, settings.t_start)
+        self._packed = with_held_inputs(model.packed_scene, self._names, settings.t_start)
         self._code = code_for_any_length(model, settings)
         self._outputs: MeasuredOutputs | None = MeasuredOutputs(LoopedEngine(self._packed))
-        self._start_run(q, u, -math.inf if self._packed.goes_by_time else math.inf)
+        self._start_run(q, u, -math.inf if self._packed.is_time_dependent else math.inf)
 
     def _start_run(self, q: Array, u: Array, reach: float) -> None:
         """Start the integrator at (q, u); its breaks are known up to `reach` (s)."""
@@ -136,7 +143,7 @@ class Session:
             return SceneError(f'inputs["{self._names[index]}"] = {value}: expected a finite number')
         if index == -1:
             return SceneError(f"dt = {dt!r}: expected a time in s, 0 or more")
-        return SceneError(f"the session was {self.stopped}; make a new one, or copy it before")
+        return SceneError(f"the session was {self.stop_reason}; make a new one, or copy it before")
 
     def _input_rejection(self, inputs: Any) -> SceneError:
         self._reset_new_inputs()
@@ -203,7 +210,7 @@ class Session:
     @property
     def risks(self) -> tuple[Risk, ...]:
         """Objections to the fixed step, and to conditions of events that may have been missed."""
-        unseen_condition = self._run.unseen
+        unseen_condition = self._run.missed_condition
         return (
             self._risks
             if unseen_condition is None
@@ -221,7 +228,7 @@ class Session:
         return dict(zip(self._names, map(float, self._input_values()), strict=True))
 
     @property
-    def stopped(self) -> str:
+    def stop_reason(self) -> str:
         """Reason why an event ended the session; "" while it runs."""
         return stop_message(self._system, self._run) if self._run.status is Status.STOPPED else ""
 
@@ -229,18 +236,20 @@ class Session:
         """Outputs of the scene at the current state by name: numbers, or arrays for vectors."""
         if self._outputs is None:
             self._outputs = MeasuredOutputs(self._system.engine)
-        values = self._outputs.at(self._system.run, self.t, self._projected_state())
-        if self._outputs.others:
+        values = self._outputs.evaluate(self._system.run, self.t, self._projected_state())
+        if self._outputs.remaining_names:
             quantities = self.result().outputs()
             values |= {
-                name: quantities[name][0] for name in self._outputs.others if name in quantities
+                name: quantities[name][0]
+                for name in self._outputs.remaining_names
+                if name in quantities
             }
         return values
 
     def result(self) -> Result:
         """Current state as a result of one sample, with all quantities of the scene."""
         model, run = self._current_model(), self._run
-        memory = self._system.memory[None, : model.packed.system.n_memory].copy()
+        memory = self._system.memory[None, : model.packed_scene.system.n_memory].copy()
         samples = Samples(np.array([run.t]), run.y[None], memory, np.zeros(1, dtype=np.int64))
         settings = replace(self.settings, t_end=run.t, output_times=None)
         trajectory = split(
@@ -256,7 +265,7 @@ class Session:
 
     def _current_model(self) -> CompiledScene:
         """Model with the current inputs."""
-        return self.model.renewed(with_input_values(self.model.packed, self.inputs))
+        return self.model.with_packed_scene(with_input_values(self.model.packed_scene, self.inputs))
 
     def copy(self) -> Self:
         """Independent session at the same state, with the same settings and inputs."""
@@ -279,7 +288,7 @@ class Session:
         )
 
     def __repr__(self) -> str:
-        return f"<Session: t = {self.t:.9g} s{self.stopped and ', '}{self.stopped}>"
+        return f"<Session: t = {self.t:.9g} s{self.stop_reason and ', '}{self.stop_reason}>"
 
 
 def step_risks(model: CompiledScene, settings: Settings, q: Array, u: Array) -> tuple[Risk, ...]:
@@ -307,15 +316,18 @@ def settable_inputs(model: CompiledScene) -> tuple[str, ...]:
     """
     drives = [active for active in active_expressions(model.scene) if active.drive]
     drive_inputs = {name for active in drives for name in active.inputs}
-    time_dependent = {name for name, number in model.packed.channels.items() if not number.stands}
-    excluded = {*drive_inputs, *model.scene.controlled, *time_dependent}
+    time_dependent = {
+        name for name, number in model.packed_scene.channels.items() if not number.is_constant
+    }
+    excluded = {*drive_inputs, *model.scene.controllers_by_input, *time_dependent}
     return tuple(entry.name for entry in model.scene.input if entry.name not in excluded)
 
 
 def unsettable_reason(model: CompiledScene, name: str, names: Sequence[str]) -> str:
     """Message why an input cannot be set during a session."""
-    if name in model.scene.controlled:
-        return f'inputs["{name}"]: controller "{model.scene.controlled[name]}" sets this input'
+    if name in model.scene.controllers_by_input:
+        controller = model.scene.controllers_by_input[name]
+        return f'inputs["{name}"]: controller "{controller}" sets this input'
     for active in active_expressions(model.scene):
         if (
             active.drive
@@ -323,8 +335,9 @@ def unsettable_reason(model: CompiledScene, name: str, names: Sequence[str]) -> 
             and any(i.name == name for i in model.scene.input)
         ):
             return (
-                f'inputs["{name}"]: the {active.what} follows this input, and a jump of a drive is '
-                "an impact; set its rates or a signal before the session, by with_inputs"
+                f'inputs["{name}"]: the {active.description} follows this input, and a jump '
+                "of a drive is an impact; set its rates or a signal before the session, by "
+                "with_inputs"
             )
     if any(entry.name == name for entry in model.scene.input):
         return (

@@ -87,7 +87,7 @@ class DynamicsQueries(KinematicQueries):
         loop, and a number of actuators other than the mobility; NumericalFailure if they cannot
         drive all motions at the state.
         """
-        if self.freedom is not None:
+        if self.independent_speeds is not None:
             from .constrained_inverse_dynamics import constrained_inverse_dynamics
 
             return copy_to(out, constrained_inverse_dynamics(self, q, u, udot, t, actuators))
@@ -114,7 +114,7 @@ class DynamicsQueries(KinematicQueries):
             rows[k] = engine.inverse_dynamics(time, a, b, c, memory) if single is None else single
         return copy_to(out, rows.reshape(*lead, nu))
 
-    def bias(
+    def bias_efforts(
         self, q: ArrayLike, u: ArrayLike, t: ArrayLike = 0.0, *, out: Array | None = None
     ) -> Array:
         """Bias force h (..., nu) of M(q) udot + h = efforts; (..., mobility) with closed loops.
@@ -122,9 +122,9 @@ class DynamicsQueries(KinematicQueries):
         From gravity, hinge laws, loads and gyroscopic terms.  Raises what `inverse_dynamics`
         raises.
         """
-        if self.freedom is None:
+        if self.independent_speeds is None:
             return self.inverse_dynamics(q, u, np.zeros(self.nu), t, out=out)
-        places = list(self.freedom.places)
+        places = list(self.independent_speeds.indices)
         return copy_to(out, self.inverse_dynamics(q, u, np.zeros(len(places)), t)[..., places])
 
     def gravity_efforts(self, q: ArrayLike, *, out: Array | None = None) -> Array:
@@ -133,7 +133,7 @@ class DynamicsQueries(KinematicQueries):
         Without hinge laws, loads and drives.  Raises SceneError for a wrong shape, NumericalFailure
         if the independent speeds do not determine the others.
         """
-        if self.freedom is None and not self.layout.modal:
+        if self.independent_speeds is None and not self.coordinate_layout.modal:
             single: Array | None = self._gravity_calls.efforts(0.0, q, *self._zero_speeds)
             if single is not None:
                 return single if out is None else copy_to(out, single)
@@ -145,11 +145,13 @@ class DynamicsQueries(KinematicQueries):
         zeros, memory = self._zero_speeds[0], self.looped.start_memory()
         with_gravity, without_gravity = (
             engine.inverse_dynamics(0.0, q, zeros, zeros, memory)
-            for engine in (self.looped.weighed, self.looped.inertia_alone)
+            for engine in (self.looped.gravity_only, self.looped.inertia_only)
         )
-        if self.freedom is None:
+        if self.independent_speeds is None:
             return with_gravity - without_gravity
-        return self.freedom.following(q, self.freedom.places).T @ (with_gravity - without_gravity)
+        return self.independent_speeds.motion_matrix(q, self.independent_speeds.indices).T @ (
+            with_gravity - without_gravity
+        )
 
     @cached_property
     def _zero_speeds(self) -> tuple[Array, Array]:
@@ -160,7 +162,7 @@ class DynamicsQueries(KinematicQueries):
         from ..engine.fused_code import NoFusedCode
         from ..engine.state_evaluation.single_state import SingleStateCalls
 
-        return SingleStateCalls(self.looped.weighed, NoFusedCode())
+        return SingleStateCalls(self.looped.gravity_only, NoFusedCode())
 
     def mass_matrix(self, q: ArrayLike, *, out: Array | None = None) -> Array:
         """Symmetric mass matrix (..., nu, nu) at q (..., nq), kg, kg*m, kg*m2.
@@ -171,7 +173,7 @@ class DynamicsQueries(KinematicQueries):
         Raises SceneError for a wrong shape, NumericalFailure if the independent speeds do not
         determine the others.
         """
-        if self.freedom is None:
+        if self.independent_speeds is None:
             calls = self._single_state
             if calls.inverse is None or calls.inverse is not self.fusion.inverse:
                 calls.seek()
@@ -180,7 +182,7 @@ class DynamicsQueries(KinematicQueries):
                 return matrix if out is None else copy_to(out, matrix)
             check_dense_size(self.nu, "the mass matrix")
         lead, (states,) = batch(("q", q, self.nq))
-        if self.freedom is not None:
+        if self.independent_speeds is not None:
             from .constrained_inverse_dynamics import reduced_mass
 
             reduced = np.array([reduced_mass(self, state) for state in states])
@@ -237,4 +239,4 @@ class DynamicsQueries(KinematicQueries):
         names = require_texts("parameters", parameters, "rod1.mass")
         differentiation = self._differentiations.get(names) or self._differentiation(names)
         answer = differentiation(q, u, t, efforts, lambda: self.accelerations(q, u, t, efforts))
-        return answer if out is None else answer.kept_in(out)
+        return answer if out is None else answer.copy_to(out)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 _MAX_HINGES, _MAX_NAMES = 50, 8
 
 
-def refuse_undetermined_start(model: CompiledScene, q: Array, u: Array) -> None:
+def check_start_determined(model: CompiledScene, q: Array, u: Array) -> None:
     """Raise SceneError, naming the hinges, if motions at the start have no inertia."""
     engine = model.looped
     start = (q[None].copy(), u[None].copy(), engine.start_memory()[None].copy())

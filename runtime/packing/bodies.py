@@ -64,9 +64,9 @@ class Bodies:
 
     def placement(self, body: int) -> Placement:
         """Internal frame of a body, given by its number."""
-        carrier = self.carried.by.get(body)
+        carrier = self.carried.carriers.get(body)
         if carrier is not None:
-            return self.carried.placed(body, self._placements[carrier][0])
+            return self.carried.pose_in_carrier(body, self._placements[carrier][0])
         if body < len(self.scene.body):
             return self._placements[body][0]
         chain, k = self.scene.bodies.member(body)
@@ -87,7 +87,7 @@ class Bodies:
         placements = self._placements[run.body]
         self._last[run.body] = placements[-1]
         del placements[period:]
-        return BodyRun(run.place, run.parent, run.count, period, tuple(members), slots)
+        return BodyRun(run.position, run.parent, run.count, period, tuple(members), slots)
 
     # --- one body ---------------------------------------------------------------------------
 
@@ -112,10 +112,10 @@ class Bodies:
         rotor, imposed = _rotor_and_imposed(hinge, slots)
         return BodyNumbers(
             ("hinge", kernel_type(hinge, self.releases)), ("body", body.type), slots.nq, slots.nu,
-            slots.straight, slots.steady, slots.turning, connection, link, placement.height,
-            hinge_p,
-            body_p, body_frame, rotor, imposed, self.releases.get(hinge.name, -1), modal, section,
-            body.name in self.expanded.idle, self.linked,
+            slots.rates_are_speeds, slots.constant_subspace, slots.rotation_speeds, connection,
+            link, placement.height, hinge_p, body_p, body_frame, rotor, imposed,
+            self.releases.get(hinge.name, -1), modal, section, body.name in self.expanded.idle,
+            self.linked,
         )  # fmt: skip
 
     def _modal_and_section(
@@ -141,7 +141,7 @@ class Bodies:
                 port, np.array(floating_frame.rotation), np.array(floating_frame.origin)
             )
         return modal, SectionNumbers(
-            self.topology.place_of_body(frame), passage.inward, Arrays(section_inputs(port)),
+            self.topology.position_of_body(frame), passage.inward, Arrays(section_inputs(port)),
             tuple(port.rotation.ravel().tolist()),
         )  # fmt: skip
 
@@ -164,14 +164,14 @@ class Bodies:
         if k + 1 < run.count:
             body, end = self.scene.bodies[run.body + k], run.ends[k % len(run.ends)]
             return self.scene.hinges[run.hinge + k + 1], end_pose(body, end)
-        child = self._first_children.get(run.place + k)
+        child = self._first_children.get(run.position + k)
         if child is None:
             return None
         inboard_end = end_pose(self.scene.bodies[child.on], child.inboard_end)
         pose = self.carried.poses.get(child.on)
         return (
             self.scene.hinges[child.hinge],
-            inboard_end if pose is None else pose.then(inboard_end),
+            inboard_end if pose is None else pose.compose(inboard_end),
         )
 
     def _period(self, run: BodyRow) -> int:
@@ -206,7 +206,7 @@ class Bodies:
         if body.type == RIGID:
             numbers = rigid_parameters(body, placement)
             for part in self.carried.parts.get(number, ()):
-                part_placement = self.carried.placed(part, placement)
+                part_placement = self.carried.pose_in_carrier(part, placement)
                 part_numbers = rigid_parameters(self.scene.body[part], part_placement)
                 numbers = tuple(a + b for a, b in zip(numbers, part_numbers, strict=True))
             return numbers, ()
@@ -245,7 +245,7 @@ def _hinge_parameters(hinge: Hinge) -> Numbers:
     """Parameters of the hinge's kernel: from scene keys, and from the table `parameters`."""
     if hinge.facts is None:
         return ()
-    declared = hinge.facts.own_parameters()
+    declared = hinge.facts.extra_parameters()
     numbers = declared_numbers(declared, hinge.parameters, f'hinge "{hinge.name}"')
     values = dict(zip((p.name for p in declared), numbers, strict=True))
     values |= parameters_from_keys(hinge)

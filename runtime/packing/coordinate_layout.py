@@ -36,9 +36,9 @@ class HingeSlots:
     Attributes:
         q, u: first index in q and in u.
         quaternion: first quaternion entry within the hinge, None without one.
-        straight: whether the speeds are the rates of the coordinates.
-        steady: whether the motion subspace is constant in the outboard body.
-        turning: whether it is constant and purely rotational.
+        rates_are_speeds: whether the speeds are the rates of the coordinates.
+        constant_subspace: whether the motion subspace is constant in the outboard body.
+        rotation_speeds: whether it is constant and purely rotational.
     """
 
     name: str
@@ -50,9 +50,9 @@ class HingeSlots:
     u_names: tuple[str, ...]
     u_units: tuple[str, ...]
     quaternion: int | None
-    straight: bool
-    steady: bool
-    turning: bool
+    rates_are_speeds: bool
+    constant_subspace: bool
+    rotation_speeds: bool
 
     @property
     def nq(self) -> int:
@@ -96,11 +96,11 @@ class Group:
     def u(self) -> int:
         return self.hinges[0].u
 
-    def q_places(self) -> Integers:
+    def q_starts(self) -> Integers:
         """Index of the first coordinate of every hinge."""
         return self._repeat([h.q for h in self.hinges], self.nq)
 
-    def u_places(self) -> Integers:
+    def u_starts(self) -> Integers:
         """Index of the first speed of every hinge."""
         return self._repeat([h.u for h in self.hinges], self.nu)
 
@@ -169,7 +169,8 @@ class Layout:
         return HingeSlots(
             self._numbers.name(hinge), slots.type, slots.q + repeats * group.nq,
             slots.u + repeats * group.nu, slots.q_names, slots.q_units, slots.u_names,
-            slots.u_units, slots.quaternion, slots.straight, slots.steady, slots.turning,
+            slots.u_units, slots.quaternion, slots.rates_are_speeds, slots.constant_subspace,
+            slots.rotation_speeds,
         )  # fmt: skip
 
     @cached_property
@@ -177,14 +178,14 @@ class Layout:
         return [group.first for group in self.groups]
 
     @cached_property
-    def q_places(self) -> Integers:
+    def q_starts(self) -> Integers:
         """Index of the first coordinate of every hinge."""
-        return _concatenate([group.q_places() for group in self.groups])
+        return _concatenate([group.q_starts() for group in self.groups])
 
     @cached_property
-    def u_places(self) -> Integers:
+    def u_starts(self) -> Integers:
         """Index of the first speed of every hinge."""
-        return _concatenate([group.u_places() for group in self.groups])
+        return _concatenate([group.u_starts() for group in self.groups])
 
     @property
     def q_names(self) -> list[str]:
@@ -206,7 +207,7 @@ class Layout:
                 yield replace(slots, name=_user_name(slots.name))
         yield from self.modal.values()
 
-    def along(self, constraint: str) -> HingeSlots:
+    def curve_slots(self, constraint: str) -> HingeSlots:
         """Slots of the curve parameter of a constraint."""
         internal_slots = (self.slots(number) for number in self.internal)
         name = f"{constraint}{OF_CONSTRAINT}"
@@ -223,7 +224,7 @@ class Layout:
         """Name `hinge.coordinate` of an entry of q."""
         slots = self._modal_slots(entry, "q")
         if slots is None:
-            slots = self.slots(int(np.searchsorted(self.q_places, entry, side="right")) - 1)
+            slots = self.slots(int(np.searchsorted(self.q_starts, entry, side="right")) - 1)
         return f"{_user_name(slots.name)}.{slots.q_names[entry - slots.q]}"
 
     def u_name(self, entry: int) -> str:
@@ -234,7 +235,7 @@ class Layout:
     def hinge_of_speed(self, entry: int) -> HingeSlots:
         """Slots of the hinge or flexible body that owns an entry of u."""
         return self._modal_slots(entry, "u") or self.slots(
-            int(np.searchsorted(self.u_places, entry, side="right")) - 1
+            int(np.searchsorted(self.u_starts, entry, side="right")) - 1
         )
 
     @cached_property
@@ -247,7 +248,7 @@ class Layout:
         """Unit -> indices of the entries of q that have it, without quaternions."""
         indices: dict[str, list[Integers]] = {}
         for group in self.groups:
-            places = group.q_places()
+            places = group.q_starts()
             for j, hinge in enumerate(group.hinges[: group.count]):
                 first, quaternion = places[j :: len(group.hinges)], hinge.quaternion
                 for k, unit in enumerate(hinge.q_units):
@@ -260,7 +261,7 @@ class Layout:
         """Unit -> indices of the entries of u that have it."""
         indices: dict[str, list[Integers]] = {}
         for group in self.groups:
-            places = group.u_places()
+            places = group.u_starts()
             for j, hinge in enumerate(group.hinges[: group.count]):
                 first = places[j :: len(group.hinges)]
                 for k, unit in enumerate(hinge.u_units):

@@ -25,19 +25,19 @@ Resolver = Callable[[Name], Node]
 
 #: Port of the numbers that carry derivatives.
 MOVING = "moving"
-Moving = Sequence[Port]
+SeedPorts = Sequence[Port]
 
 
 class Values:
     """Values of expressions at (t, q, u); equal expressions share one index."""
 
-    def __init__(self, layout: Layout, moving: Moving = ()) -> None:
-        self.layout, self._moving = layout, moving
+    def __init__(self, layout: Layout, moving: SeedPorts = ()) -> None:
+        self.layout, self._seed_ports = layout, moving
         self._graph = Graph()
         self._nodes: list[Node] = []
         self._indices: dict[int, int] = {}
 
-    def place(self, expression: Expression, own: Hinge | None = None) -> int:
+    def value_index(self, expression: Expression, own: Hinge | None = None) -> int:
         """Index of the expression's value, which is added if it is new; -1 for constant zero."""
         if expression.is_zero:
             return -1
@@ -52,7 +52,7 @@ class Values:
 
     def kernel(self) -> KernelIR:
         """Kernel (t, q, u, inputs) -> all values."""
-        inputs = [*state_ports(self.layout), inputs_port(self.layout), *self._moving]
+        inputs = [*state_ports(self.layout), inputs_port(self.layout), *self._seed_ports]
         return values_kernel(self._graph, "values", inputs, self._nodes)
 
 
@@ -92,7 +92,7 @@ def resolver(
             _check_index(name, hinge, index, slots.q_names if quantity == "q" else slots.u_names)
             return graph.element(quantity, first + index)
         if quantity in CURVE_QUANTITIES and name.owner:
-            slots, port = layout.along(name.owner), "qu"[CURVE_QUANTITIES.index(quantity)]
+            slots, port = layout.curve_slots(name.owner), "qu"[CURVE_QUANTITIES.index(quantity)]
             return graph.element(port, getattr(slots, port))
         if quantity in ("q", "u") and length:
             return graph.element("length", 0 if quantity == "q" else 1)
@@ -123,7 +123,7 @@ def values_kernel(graph: Graph, name: str, inputs: Sequence[Port], nodes: list[N
     return graph.kernel(name, inputs, [output], {"values": nodes})
 
 
-def drive_kernel(drives: Sequence[Expression], layout: Layout, moving: Moving = ()) -> KernelIR:
+def drive_kernel(drives: Sequence[Expression], layout: Layout, moving: SeedPorts = ()) -> KernelIR:
     """Kernel (t, inputs) -> position, speed and acceleration of every drive."""
     graph = Graph()
     time, resolve = graph.element("t", 0), resolver(graph, layout)
@@ -131,7 +131,7 @@ def drive_kernel(drives: Sequence[Expression], layout: Layout, moving: Moving = 
     return values_kernel(graph, "drives", [Port("t", (1,)), inputs_port(layout), *moving], nodes)
 
 
-def effort_kernel(effort: Expression, layout: Layout, moving: Moving = ()) -> KernelIR:
+def effort_kernel(effort: Expression, layout: Layout, moving: SeedPorts = ()) -> KernelIR:
     """Kernel (t, q, u, [length, rate], inputs) -> effort of a spring."""
     graph = Graph()
     node = effort.build(graph, resolver(graph, layout, length=True))

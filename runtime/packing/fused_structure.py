@@ -52,12 +52,12 @@ def structure_and_numbers(
     used = {key for body in bodies for key in (body.hinge, body.body)}
     used |= {force.element for force in forces}
     values, prescribed = builder.expression(system.values), builder.expression(system.drives)
-    coupled = builder.expression(system.coupled)
+    coupled = builder.expression(system.coupling_kernel)
     inputs = tuple(sorted(builder.inputs.items()))
     structure = Structure(
-        system.nq, system.nu, len(builder.numbers), system.held.first, gravity, bodies, laws, loads,
-        forces, values, prescribed, system.driven, closures, rows, couplings,
-        coupled, {key: elements[key].hash for key in sorted(used)}, inputs,
+        system.nq, system.nu, len(builder.numbers), system.held_inputs.first, gravity, bodies, laws,
+        loads, forces, values, prescribed, system.driven, closures, rows, couplings, coupled,
+        {key: elements[key].hash for key in sorted(used)}, inputs,
     )  # fmt: skip
     return structure, builder.numbers
 
@@ -66,9 +66,9 @@ class _StructureBuilder:
     """Sorts the numbers of a system into structural constants and indices of p."""
 
     def __init__(self, system: System, bake: bool) -> None:
-        self.moving, self.bake = system.moving, bake
+        self.moving, self.bake = system.seeded_numbers, bake
         self.numbers: list[Any] = []
-        self._inputs_at_zero = [x for channel in system.inputs for x in channel.at(0.0)]
+        self._inputs_at_zero = [x for channel in system.inputs for x in channel.piece_at(0.0)]
         #: Index among the numbers of all inputs -> index in p, for those that are read.
         self.inputs: dict[int, int] = {}
 
@@ -131,9 +131,9 @@ class _StructureBuilder:
 
     def bodies(self, run: given.BodyRun) -> Iterable[code.BodyStructure]:
         """Structures of all bodies of a run."""
-        places = zip(run.slots.q_places().tolist(), run.slots.u_places().tolist(), strict=True)
+        places = zip(run.slots.q_starts().tolist(), run.slots.u_starts().tolist(), strict=True)
         for k, (q, u) in enumerate(places):
-            yield self._body(run.member(k), run.place + k - 1 if k else run.parent, q, u)
+            yield self._body(run.member(k), run.position + k - 1 if k else run.parent, q, u)
 
     def _body(self, body: given.BodyNumbers, parent: int, q: int, u: int) -> code.BodyStructure:
         link = self._link(body)
@@ -181,7 +181,7 @@ class _StructureBuilder:
 
     def laws(self, run: given.LawRun) -> Iterable[code.LawStructure]:
         """Structures of all laws of a run."""
-        for law, body, twist, effort in run.each():
+        for law, body, twist, effort in run.iterate_laws():
             yield code.LawStructure(
                 body, law.kernel, law.coordinate, law.speed, law.n, twist, self.entries(law.p),
                 self.entries(law.axes, axes=True), effort,

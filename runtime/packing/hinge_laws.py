@@ -13,7 +13,7 @@ from mstmm.scene.tables.hinge_frames import twist_axes
 
 from .coordinate_layout import HingeSlots, Layout
 from .expression_tapes import Values
-from .system import LawNumbers, LawRun, Numbers, Places
+from .system import Indices, LawNumbers, LawRun, Numbers
 
 _ZERO = number(0)
 
@@ -48,7 +48,7 @@ def law_runs(
         pattern = [draft for k in range(period) for draft in _member_laws(scene, layout, run, k)]
         if pattern:
             law_run = _repeat_pattern(scene, values, run, period, pattern, memory)
-            memory = law_run.next_twist
+            memory = law_run.next_angle_index
             yield law_run
 
 
@@ -70,13 +70,13 @@ def _repeat_pattern(
     count = repeats * len(pattern) + sum(draft.member < rest for draft in pattern)
     common = ("t", *scene.channels)
     varies = [any(_is_hinge_specific(e, common) for e in draft.efforts) for draft in pattern]
-    places: list[list[Places]] = [[] for _ in pattern]
+    places: list[list[Indices]] = [[] for _ in pattern]
     for row in range(count if any(varies) else len(pattern)):
         repeat, k = divmod(row, len(pattern))
         if repeat == 0 or varies[k]:
             draft = pattern[k]
             hinge = scene.hinges[run.hinge + repeat * period + draft.member]
-            places[k].append(tuple(values.place(effort, hinge) for effort in draft.efforts))
+            places[k].append(tuple(values.value_index(effort, hinge) for effort in draft.efforts))
     laws, turns = [], 0
     for draft, effort_places in zip(pattern, places, strict=True):
         member, kernel, coordinate, speed, p, efforts, axes = draft
@@ -84,7 +84,7 @@ def _repeat_pattern(
         turns += bool(axes)
         per_repeat = tuple(effort_places)
         laws.append(LawNumbers(member, kernel, coordinate, speed, n, turn, p, axes, per_repeat))
-    return LawRun(run.place, count, period, tuple(laws), twist)
+    return LawRun(run.position, count, period, tuple(laws), twist)
 
 
 def _is_hinge_specific(effort: Expression, common: Collection[str]) -> bool:
@@ -101,7 +101,7 @@ def _coordinate_laws(hinge: Hinge, slots: HingeSlots, member: int) -> list[Draft
     laws = []
     for k in range(slots.nu):
         entry = hinge.law.entry(k)
-        full = entry.friction.acts or entry.limits.yields
+        full = entry.friction.acts or entry.limits.is_compliant
         if not (_acts(entry) or full):
             continue
         p = (
@@ -120,8 +120,8 @@ def _friction_and_stops(entry: LawEntry) -> Numbers:
     return (
         friction.coulomb, friction.static, friction.stribeck_velocity,
         friction.regularisation_velocity,
-        -_UNREACHABLE if limits.lower is None or not limits.yields else limits.lower,
-        _UNREACHABLE if limits.upper is None or not limits.yields else limits.upper,
+        -_UNREACHABLE if limits.lower is None or not limits.is_compliant else limits.lower,
+        _UNREACHABLE if limits.upper is None or not limits.is_compliant else limits.upper,
         limits.stiffness, limits.damping,
     )  # fmt: skip
 

@@ -29,7 +29,7 @@ def start_values(
                 q[slots.q_slice], u[slots.u_slice] = hinge_q, hinge_u
                 continue
             for target, first, values in (
-                (q, group.q_places(), hinge_q), (u, group.u_places(), hinge_u)
+                (q, group.q_starts(), hinge_q), (u, group.u_starts(), hinge_u)
             ):  # fmt: skip
                 if len(values):
                     repeats = first[k :: len(group.hinges)]

@@ -22,7 +22,7 @@ GROUND = -1
 
 
 @dataclass(frozen=True)
-class Reach:
+class LoadDependence:
     """Dependence of the loads on the motion of bodies, which are given by position in the tree.
 
     Attributes:
@@ -36,14 +36,14 @@ class Reach:
 
     loads: tuple[bool, ...]
     forces: tuple[bool, ...]
-    placed: tuple[int, ...]
-    across: tuple[int, ...]
-    watched: tuple[frozenset[int], ...]
+    own_load_bodies: tuple[int, ...]
+    coupled_bodies: tuple[int, ...]
+    load_sources: tuple[frozenset[int], ...]
     efforts: tuple[tuple[int, int], ...]
-    heard: tuple[frozenset[int], ...]
+    effort_sources: tuple[frozenset[int], ...]
 
 
-def load_coupling(system: System) -> Reach:
+def load_coupling(system: System) -> LoadDependence:
     """Dependence of the loads of a system on the motion of bodies."""
     value_readings = _value_readings(system)
     load_readings = [
@@ -73,10 +73,10 @@ def load_coupling(system: System) -> Reach:
         for body in sides:
             watched.setdefault(body, set()).update(sides, bodies)
     across = tuple(sorted(watched.keys() - {GROUND}))
-    return Reach(
-        loads, tuple(forces), _with_inboard_bodies(system, own | set(system.dragged)), across,
-        tuple(frozenset(watched[body] - {GROUND}) for body in across),
-        efforts, tuple(value_readings[value] for value, _ in efforts),
+    return LoadDependence(
+        loads, tuple(forces), _with_inboard_bodies(system, own | set(system.bodies_with_drag)),
+        across, tuple(frozenset(watched[body] - {GROUND}) for body in across), efforts,
+        tuple(value_readings[value] for value, _ in efforts),
     )  # fmt: skip
 
 
@@ -89,7 +89,7 @@ def _closure_couplings(
     """
     if not system.closures:
         return
-    first, parents = system.places["u"].tolist(), system.parents.tolist()
+    first, parents = system.first_indices["u"].tolist(), system.parents.tolist()
     for closure in system.closures:
         frame = closure.frame
         speeds = range(first[frame], first[frame] + system.body(frame).nu)
@@ -126,11 +126,11 @@ def _state_efforts(
     """(value, speed) of each law effort that is an expression of the state."""
     if not system.laws or not any(value_readings):
         return
-    first = system.places["u"]
+    first = system.first_indices["u"]
     for run in system.laws:
         indices = (k for law in run.pattern for efforts in law.efforts for k in efforts)
         if any(k >= 0 and value_readings[k] for k in indices):
-            for law, body, _, values in run.each():
+            for law, body, _, values in run.iterate_laws():
                 for j, value in enumerate(values):
                     if value >= 0 and value_readings[value]:
                         yield value, int(first[body]) + law.speed + j
@@ -169,7 +169,7 @@ def _owners(system: System) -> dict[str, Integers]:
     """Position in the tree of the body that owns each coordinate "q" and speed "u"."""
     sizes = {"q": system.rows(lambda body: body.nq), "u": system.rows(lambda body: body.nu)}
     owners = {"q": np.full(system.nq, GROUND), "u": np.full(system.nu, GROUND)}
-    for port, firsts in system.places.items():
+    for port, firsts in system.first_indices.items():
         count = sizes[port]
         within = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
         owners[port][np.repeat(firsts, count) + within] = np.repeat(np.arange(len(count)), count)

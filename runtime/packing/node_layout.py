@@ -44,8 +44,8 @@ def build_layout(
             name, "modes", q, u, body.modes, units, speeds, rates, None, True, True, False
         )  # fmt: skip
         q, u = q + n, u + n
-    internal = range(len(expanded.described.hinge), len(scene.hinge))
-    return Layout(scene, tuple(groups), q, u, modal, internal, expanded.described.channels)
+    internal = range(len(expanded.user_scene.hinge), len(scene.hinge))
+    return Layout(scene, tuple(groups), q, u, modal, internal, expanded.user_scene.channels)
 
 
 def _slots(
@@ -57,8 +57,8 @@ def _slots(
     assert facts is not None  # `get` has rejected unknown types
     return HingeSlots(
         hinge.name, hinge.type, q, u, *_names_and_units(facts.coordinates),
-        *_names_and_units(facts.speeds), facts.quaternion, facts.straight, facts.steady,
-        facts.steady and not facts.slides,
+        *_names_and_units(facts.speeds), facts.quaternion, facts.straight, facts.constant_subspace,
+        facts.constant_subspace and not facts.slides,
     )  # fmt: skip
 
 

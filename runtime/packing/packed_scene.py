@@ -14,7 +14,7 @@ from ..discontinuities.time_map import TimeMap, time_map
 from .records.expression_derivatives import LOCK, Slopes, write_slopes
 from .records.model_record import Written
 from .scene_frames import Frames
-from .switch_margins import Watched, event_order
+from .switch_margins import EventFunctions, event_order
 from .system import System
 
 #: Largest number of cached time maps.
@@ -31,8 +31,8 @@ class PackedScene(Frames):
         workspace: length of the workspace.
         qr: whether accelerations come from the QR sweep.
         refined: whether accelerations of a tree are refined.
-        held: names of the inputs that are set during a run.
-        behind: gives the cause and remedy of loops that cannot move on, "" if unknown.
+        held_input_names: names of the inputs that are set during a run.
+        find_loop_cause: gives the cause and remedy of loops that cannot move on, "" if unknown.
     """
 
     system: System
@@ -46,8 +46,8 @@ class PackedScene(Frames):
     product: Any = None
     qr: bool = False
     refined: bool = False
-    held: frozenset[str] = frozenset()
-    behind: Callable[[], str] = str
+    held_input_names: frozenset[str] = frozenset()
+    find_loop_cause: Callable[[], str] = str
     _time_maps: dict[tuple[float, float], TimeMap] = field(default_factory=dict)
     _slopes: Slopes | None = None
 
@@ -70,7 +70,11 @@ class PackedScene(Frames):
             inputs = self.channels
             samples = [controller.sample_time for controller in self.scene.controller]
             self._time_maps[span] = time_map(
-                active_expressions(self.scene, self.held, inputs), start, end, inputs, samples
+                active_expressions(self.scene, self.held_input_names, inputs),
+                start,
+                end,
+                inputs,
+                samples,
             )
         return self._time_maps[span]
 
@@ -82,16 +86,16 @@ class PackedScene(Frames):
             return self._slopes
 
     @cached_property
-    def watched(self) -> Watched:
+    def event_functions(self) -> EventFunctions:
         """Tape of the event functions: events, releases and switches."""
-        return event_order(self.scene, self.layout, self.held)
+        return event_order(self.scene, self.layout, self.held_input_names)
 
     @cached_property
-    def goes_by_time(self) -> bool:
+    def is_time_dependent(self) -> bool:
         """Whether times of step ends or step limits may be known before a run."""
         return bool(self.scene.controller) or any(
             active.inputs or active.drive or "t" in {name.text for name in active.expression.names}
-            for active in active_expressions(self.scene, self.held)
+            for active in active_expressions(self.scene, self.held_input_names)
         )
 
 
@@ -111,7 +115,7 @@ def enable_refinement(packed: PackedScene, times: int) -> None:
 
     Closed loops have their own workspace and number of refinements.
     """
-    if packed.system.closes:
+    if packed.system.has_loops:
         return
     if not packed.refined:
         packed.model.answer = packed.scratch

@@ -167,7 +167,7 @@ class _Moving(Expression):
     """Entry of the port "moving" in place of a constant expression."""
 
     number: Any
-    place: int
+    index: int
 
     @property
     def is_zero(self) -> bool:
@@ -176,7 +176,7 @@ class _Moving(Expression):
 
     def build(self, graph: Terms, resolve: Callable[[Name], Node]) -> Node:
         """Node of the port's entry."""
-        return graph.element(MOVING, self.place)
+        return graph.element(MOVING, self.index)
 
 
 def _with_seeds(scene: Scene, names: Sequence[str], seed: Seed) -> tuple[Scene, dict[int, Any]]:
@@ -208,11 +208,11 @@ def _with_changed_number(scene: Scene, name: str, change: Change) -> Scene:
     ]
     fields: dict[str, Any] = {key: getattr(scene, key) for key in type(scene).model_fields}
     if parts[0] == "gravity":
-        fields["gravity"] = _replaced(scene.gravity, parts[1:], change)
+        fields["gravity"] = _replace_number(scene.gravity, parts[1:], change)
     else:
         for table in scene_parameters.TABLES:
             fields[table] = tuple(
-                _changed_element(element, parts[1:], change)
+                _change_element(element, parts[1:], change)
                 if element.name == parts[0] and parts[1] in type(element).model_fields
                 else element
                 for element in fields[table]
@@ -221,10 +221,10 @@ def _with_changed_number(scene: Scene, name: str, change: Change) -> Scene:
     return Scene.model_construct(**fields)
 
 
-def _changed_element(element: BaseModel, parts: Sequence[str | int], change: Change) -> BaseModel:
+def _change_element(element: BaseModel, parts: Sequence[str | int], change: Change) -> BaseModel:
     if isinstance(element, Hinge) and parts[0] == "parameters":
         _check_not_in_effort(element, str(parts[1]))
-    changed = _replaced(element, parts, change)
+    changed = _replace_number(element, parts, change)
     if isinstance(changed, Hinge) and parts[0] == "normal":
         return changed.model_copy(update={"axis": changed.normal})
     return changed
@@ -240,13 +240,15 @@ def _check_not_in_effort(hinge: Hinge, parameter: str) -> None:
         )
 
 
-def _replaced(target: Any, parts: Sequence[str | int], change: Change) -> Any:
+def _replace_number(target: Any, parts: Sequence[str | int], change: Change) -> Any:
     """Copy of `target` with the number at the end of the path changed."""
     if not parts:
         return change(target)
     key, rest = parts[0], parts[1:]
     if isinstance(target, tuple):
-        return tuple(_replaced(x, rest, change) if i == key else x for i, x in enumerate(target))
+        return tuple(
+            _replace_number(x, rest, change) if i == key else x for i, x in enumerate(target)
+        )
     if isinstance(target, Mapping):
-        return {**target, key: _replaced(target[key], rest, change)}
-    return target.model_copy(update={key: _replaced(getattr(target, str(key)), rest, change)})
+        return {**target, key: _replace_number(target[key], rest, change)}
+    return target.model_copy(update={key: _replace_number(getattr(target, str(key)), rest, change)})

@@ -25,7 +25,7 @@ PIN, BALL, ACCELERATION = "PIN", "BALL", "ACCELERATION"
 def _kind(hinge: Hinge) -> str | None:
     """Kind of a hinge; None if there is no classical matrix."""
     facts = hinge.facts
-    if facts is None or not facts.steady or (facts.slides and not facts.free_body):
+    if facts is None or not facts.constant_subspace or (facts.slides and not facts.free_body):
         return None
     if facts.free_body:
         return ACCELERATION

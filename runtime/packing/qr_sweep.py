@@ -37,8 +37,8 @@ def enable_qr_sweep(packed: PackedScene) -> None:
         )
     for number, body in enumerate(packed.system.distinct):
         if _min_eigenvalue(_mass_matrix(packed, body)) < _NEGATIVE:
-            place = int(np.argmax(packed.system.which == number))
-            name = packed.scene.bodies.name(packed.topology.at(place)[0])
+            place = int(np.argmax(packed.system.distinct_indices == number))
+            name = packed.scene.bodies.name(packed.topology.scene_indices(place)[0])
             raise SceneError(
                 f'body "{name}": sweep = "qr" needs a positive semidefinite mass matrix, found a '
                 "negative eigenvalue (a negative moment of inertia about some axis, or a mass "

@@ -13,7 +13,7 @@ from ..flexible.modal_body import ModalBody
 from .coordinate_layout import Layout
 from .flexible.expansion import ExpandedScene
 from .frame_placement import Placement
-from .merging.simplification import Simplification, Words
+from .merging.simplification import Simplification, SimplifyOptions
 from .scene_elements import Elements
 
 
@@ -41,12 +41,12 @@ class Frames:
     hinge_position: Mapping[str, int]
     expanded: ExpandedScene
     simplified: tuple[Simplification, ...]
-    simplify: Words
+    simplify: SimplifyOptions
 
     @property
-    def described(self) -> Scene:
+    def user_scene(self) -> Scene:
         """Scene as the user wrote it."""
-        return self.expanded.described
+        return self.expanded.user_scene
 
     @property
     def flexible(self) -> Mapping[str, ModalBody]:

@@ -10,7 +10,7 @@ from mstmm.scene import Scene
 from ..flexible.modal_body import ModalBody
 from ..kernels import prebuilt_kernels
 from . import product_sweep, qr_sweep
-from .merging.simplification import LINKED, WELDS, Words
+from .merging.simplification import LINKED, WELDS, SimplifyOptions
 from .packed_scene import PackedScene, enable_refinement, resize_workspace
 from .records.model_record import write_model
 from .scene_elements import Known
@@ -27,7 +27,7 @@ def pack(
     sweep: str = "riccati",
     align: bool = True,
     flexible: Mapping[str, ModalBody] | None = None,
-    simplify: Words = LINKED,
+    simplify: SimplifyOptions = LINKED,
 ) -> PackedScene:
     """Pack a scene; arguments as in `system_of`.
 
@@ -37,7 +37,9 @@ def pack(
     """
     system, frames = system_of(scene, known, align=align, flexible=flexible, simplify=simplify)
     packed = packed_system(system, frames)
-    if product_accuracy is not None and not system.closes:  # with loops, it follows their analysis
+    if (
+        product_accuracy is not None and not system.has_loops
+    ):  # with loops, it follows their analysis
         product_sweep.enable_product_sweep(packed, product_accuracy)
     if sweep == "qr":
         qr_sweep.enable_qr_sweep(packed)
@@ -53,11 +55,11 @@ def without_merging(packed: PackedScene) -> PackedScene:
         return packed
     simplify = {kind: value for kind, value in packed.simplify.items() if kind != WELDS}
     system, frames = system_of(
-        packed.described, packed.elements.known, flexible=packed.modal, simplify=simplify
+        packed.user_scene, packed.elements.known, flexible=packed.modal, simplify=simplify
     )
     current = packed.system
     couplings = tuple(
-        replace(coupling, kept=other.kept, repeats=other.repeats)
+        replace(coupling, constant=other.constant, repeats=other.repeats)
         for coupling, other in zip(system.couplings, current.couplings, strict=True)
     )
     closures = tuple(
@@ -65,11 +67,12 @@ def without_merging(packed: PackedScene) -> PackedScene:
         for closure, other in zip(system.closures, current.closures, strict=True)
     )
     system = replace(
-        system, inputs=current.inputs, held=current.held, by_time=current.by_time,
-        n_memory=current.n_memory, couplings=couplings, closures=closures,
+        system, inputs=current.inputs, held_inputs=current.held_inputs,
+        depends_on_time=current.depends_on_time, n_memory=current.n_memory, couplings=couplings,
+        closures=closures,
     )  # fmt: skip
     unmerged = packed_system(system, frames)
-    unmerged.held = packed.held
+    unmerged.held_input_names = packed.held_input_names
     if packed.qr:
         qr_sweep.enable_qr_sweep(unmerged)
     if packed.refined:

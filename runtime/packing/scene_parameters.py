@@ -85,7 +85,7 @@ def with_parameters(scene: Scene, changes: Mapping[str, float]) -> Scene:
     given_names, names_without_index = dict[str, str](), dict[str, list[str]]()
     for given_name, given_value in mapping_by_name("parameters", changes).items():
         value = finite_float(f'parameter "{given_name}"', given_value)
-        candidates = scene.names.meant(given_name)
+        candidates = scene.names.resolve(given_name)
         name = next((path for path in candidates if _set(data, path, value)), None)
         if name is None:
             parameters = parameters or scene_parameters(scene)
@@ -159,7 +159,7 @@ def resolve_names(scene: Scene, names: Sequence[str]) -> list[str]:
     full_names = []
     for given in names:
         candidates = (
-            name for name in scene.names.meant(given)
+            name for name in scene.names.resolve(given)
             if name in parameters or name in without_index
         )  # fmt: skip
         name = next(candidates, given)

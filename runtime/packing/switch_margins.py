@@ -27,7 +27,7 @@ from .expression_tapes import Resolver, event_tape, resolver
 from .records.bounce_records import Bounce, build_bounces
 
 #: Largest number of margins: each is evaluated several times per step.
-MOST = 1000
+MAX_SWITCHES = 1000
 
 #: (body, end) -> number among the ends whose positions and velocities a tape reads.
 Probes = dict[tuple[str, str], int]
@@ -38,11 +38,11 @@ class Switch:
     """Margin, and the expression that switches, as the user wrote it."""
 
     margin: Node
-    what: str
+    description: str
 
 
 @dataclass(frozen=True)
-class Watched:
+class EventFunctions:
     """Event functions of a scene.
 
     Attributes:
@@ -59,7 +59,7 @@ class Watched:
     bounces: tuple[Bounce, ...] = ()
 
 
-def event_order(scene: Scene, layout: Layout, held: Collection[str] = ()) -> Watched:
+def event_order(scene: Scene, layout: Layout, held: Collection[str] = ()) -> EventFunctions:
     """Event functions: events in file order, hard stops, releases, then switches.
 
     `held` are inputs that are set during the run.
@@ -69,11 +69,11 @@ def event_order(scene: Scene, layout: Layout, held: Collection[str] = ()) -> Wat
     conditions: list[tuple[Expression, Hinge | None]] = [(e.when, None) for e in scene.events]
     conditions += [(h.release, h) for h in scene.hinge if h.release is not None]
     if not conditions and not switches:
-        return Watched(None, (), ())
-    margins = [switch.margin for switch in switches[:MOST]]
+        return EventFunctions(None, (), ())
+    margins = [switch.margin for switch in switches[:MAX_SWITCHES]]
     tape = event_tape(conditions, layout, graph, probes, margins)
     bounces = build_bounces(scene, layout, dict(probes))
-    return Watched(tape, tuple(probes), tuple(switches), bounces)
+    return EventFunctions(tape, tuple(probes), tuple(switches), bounces)
 
 
 def has_switches(scene: Scene) -> bool:
@@ -91,7 +91,7 @@ def state_switches(
     switches: dict[int, Switch] = {}
     for active in active_expressions(scene, held):
         terms = _switching_terms(active)
-        for own in islice(examined_hinges(active, scene.hinges), MOST + 1) if terms else ():
+        for own in islice(examined_hinges(active, scene.hinges), MAX_SWITCHES + 1) if terms else ():
             resolve = resolver(graph, layout, own, probes=probes)
             if active.spring is not None:
                 resolve = _with_spring_length(resolve, graph, active, probes)
@@ -101,8 +101,10 @@ def state_switches(
                 a, *rest = (nodes[i] for i in term.args)
                 margin = a - rest[0] if rest else a
                 text = active.expression.text[term.start : term.end]
-                if margin.value is None and len(switches) <= MOST:
-                    switches.setdefault(margin.number, Switch(margin, f"{text!r} ({active.what})"))
+                if margin.value is None and len(switches) <= MAX_SWITCHES:
+                    switches.setdefault(
+                        margin.number, Switch(margin, f"{text!r} ({active.description})")
+                    )
     return list(switches.values())
 
 
@@ -114,12 +116,14 @@ def _switching_terms(active: ActiveExpression) -> list[int]:
     """
     expression, constants = active.expression, dict(active.constants)
     of_time = set(terms_of_time(expression, constants)[0])
-    if active.held:
-        order, moving = terms_of_time(expression, constants | dict.fromkeys(active.held, 0.0))
+    if active.held_inputs:
+        order, moving = terms_of_time(
+            expression, constants | dict.fromkeys(active.held_inputs, 0.0)
+        )
         of_time |= set(order) - set(moving)
     return [
         number
-        for number in sorted(expression.needed - of_time)
+        for number in sorted(expression.required_terms - of_time)
         if expression.terms[number].op in SWITCHES
         and not (active.condition and number == expression.root)
     ]

@@ -29,7 +29,7 @@ _TIME_INDEPENDENT: tuple[Key, ...] = (
     ("force", "spring"), ("force", "bushing6"), ("force", "bearing6"), ("force", "bearing3"),
 )  # fmt: skip
 #: Indices of values of the scene's expressions, -1 for constant zero.
-Places = tuple[int, ...]
+Indices = tuple[int, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,33 +125,33 @@ class BodyRun:
     """Bodies at consecutive positions, each the child of the previous: a single body or a chain.
 
     Attributes:
-        place: position of the first one.
+        position: position of the first one.
         parent: position of its parent.
         count: number of bodies.
         period: number of bodies after which the pattern repeats.
-        alike: the first member, one period of the following ones, and the last.
+        members: the first member, one period of the following ones, and the last.
         slots: indices of the hinges in q and u.
     """
 
-    place: int
+    position: int
     parent: int
     count: int
     period: int
-    alike: tuple[BodyNumbers, ...]
+    members: tuple[BodyNumbers, ...]
     slots: Group
 
     @property
-    def which(self) -> Integers:
-        """Index in `alike` of each member (count,)."""
+    def member_indices(self) -> Integers:
+        """Index in `members` of each member (count,)."""
         indices = 1 + np.arange(-1, self.count - 1) % self.period
-        indices[0], indices[-1] = 0, len(self.alike) - 1
+        indices[0], indices[-1] = 0, len(self.members) - 1
         return indices
 
     def member(self, k: int) -> BodyNumbers:
         """Numbers of member k."""
         if k in (0, self.count - 1):
-            return self.alike[-1 if k else 0]
-        return self.alike[1 + (k - 1) % self.period]
+            return self.members[-1 if k else 0]
+        return self.members[1 + (k - 1) % self.period]
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,7 +175,7 @@ class LawNumbers:
     turn: int
     p: Numbers
     axes: Numbers
-    efforts: tuple[Places, ...]
+    efforts: tuple[Indices, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,38 +183,42 @@ class LawRun:
     """Laws of a run of bodies: those of a pattern, repeated.
 
     Attributes:
-        place: position of the first body.
+        position: position of the first body.
         count: number of laws.
         period: number of bodies of the pattern.
         pattern: its laws.
         twist: index in memory of the first tracked rotation angle.
     """
 
-    place: int
+    position: int
     count: int
     period: int
     pattern: tuple[LawNumbers, ...]
     twist: int
 
     @property
-    def turns(self) -> int:
+    def rotation_count(self) -> int:
         """Number of laws of the pattern that track a rotation angle."""
         return sum(law.turn >= 0 for law in self.pattern)
 
     @property
-    def next_twist(self) -> int:
+    def next_angle_index(self) -> int:
         """Index in memory after the last tracked angle of the run."""
         repeats, rest = divmod(self.count, len(self.pattern))
-        return self.twist + repeats * self.turns + sum(x.turn >= 0 for x in self.pattern[:rest])
+        return (
+            self.twist
+            + repeats * self.rotation_count
+            + sum(x.turn >= 0 for x in self.pattern[:rest])
+        )
 
-    def each(self) -> Iterator[tuple[LawNumbers, int, int, Places]]:
+    def iterate_laws(self) -> Iterator[tuple[LawNumbers, int, int, Indices]]:
         """All laws: (law, position of its body, index in memory or -1, efforts)."""
-        turns = self.turns
+        turns = self.rotation_count
         for row in range(self.count):
             repeat, k = divmod(row, len(self.pattern))
             law = self.pattern[k]
             twist = self.twist + repeat * turns + law.turn if law.turn >= 0 else -1
-            body = self.place + repeat * self.period + law.member
+            body = self.position + repeat * self.period + law.member
             yield law, body, twist, law.efforts[repeat if len(law.efforts) > 1 else 0]
 
 
@@ -234,8 +238,8 @@ class LoadNumbers:
     axes: int
     axes_own: Numbers
     offset: Numbers
-    force: Places
-    moment: Places
+    force: Indices
+    moment: Indices
 
 
 @dataclass(frozen=True, slots=True)
@@ -260,12 +264,12 @@ class HeldInputs:
 
     Attributes:
         first: index in memory of the first number.
-        places: index in memory of each input, -1 for functions of time.
+        memory_indices: index in memory of each input, -1 for functions of time.
         start: initial numbers from `first` on.
     """
 
     first: int
-    places: tuple[int, ...]
+    memory_indices: tuple[int, ...]
     start: Numbers = ()
 
 
@@ -283,7 +287,7 @@ class ClosureNumbers:
         directions: directions that have a constraint row, of 0 to 5, the hinge's speeds first.
         kind: "hinge", or a constraint of derive/equations/constraints.py, which constrains less.
         p: numbers of the constraint.
-        of_speeds: directions that are constrained at the level of speeds only.
+        speed_directions: directions that are constrained at the level of speeds only.
         asked: number of constrained directions; those of them without a row are redundant.
         choice: (first index in memory, number of active rows) if the redundant rows change during
             the motion; memory holds whether each row is inactive.
@@ -296,7 +300,7 @@ class ClosureNumbers:
     directions: tuple[int, ...]
     kind: str = "hinge"
     p: Numbers = ()
-    of_speeds: tuple[int, ...] = ()
+    speed_directions: tuple[int, ...] = ()
     asked: int = 6
     choice: tuple[int, int] | None = None
 
@@ -305,7 +309,7 @@ class ClosureNumbers:
 class CoupledHinge:
     """Hinge of a coupling: positions of its outboard body or frame, and of the coupled bodies."""
 
-    place: int
+    position: int
     inboard: int
     outboard: int
 
@@ -317,7 +321,7 @@ class CouplingNumbers:
     Attributes:
         first: index of its numbers in the output of `System.coupled`.
         of_speeds: whether it is on speeds.
-        kept: constant value of its expression, None while it is unknown.
+        constant: constant value of its expression, None while it is unknown.
         repeats: whether it is redundant and has no row.
     """
 
@@ -325,7 +329,7 @@ class CouplingNumbers:
     first: int
     hinges: tuple[CoupledHinge, ...]
     of_speeds: bool
-    kept: float | None
+    constant: float | None
     repeats: bool = False
 
 
@@ -335,22 +339,23 @@ class System:
 
     Attributes:
         n_memory: length of the memory of a run.
-        strained: index in memory of whether the last step ended near a singular configuration,
+        strain_index: index in memory of whether the last step ended near a singular configuration,
             -1 without loops.
         values: kernel of efforts and load components.
         drives: kernel of value, rate and acceleration of each driven coordinate.
         driven: (position of the body, coordinate) of each driven coordinate.
         inputs: inputs and signals over time.
-        held: those that are set during a run.
-        by_time: whether an effort or load depends on time, also by an input.
-        moving: numbers in expressions that carry derivatives, by index in the port "moving".
-        coupled: kernel of the numbers of `couplings` (`loops.coupling_numbers`).
+        held_inputs: those that are set during a run.
+        depends_on_time: whether an effort or load depends on time, also by an input.
+        seeded_numbers: numbers in expressions that carry derivatives, by index in the port
+            "moving".
+        coupling_kernel: kernel of the numbers of `couplings` (`loops.coupling_numbers`).
     """
 
     nq: int
     nu: int
     n_memory: int
-    strained: int
+    strain_index: int
     gravity: Numbers
     bodies: tuple[BodyRun, ...]
     laws: tuple[LawRun, ...]
@@ -360,34 +365,34 @@ class System:
     drives: KernelIR | None
     driven: tuple[tuple[int, int], ...]
     inputs: tuple[PiecewisePolynomial, ...]
-    held: HeldInputs
-    by_time: bool
-    moving: Mapping[int, Any]
+    held_inputs: HeldInputs
+    depends_on_time: bool
+    seeded_numbers: Mapping[int, Any]
     closures: tuple[ClosureNumbers, ...] = ()
     couplings: tuple[CouplingNumbers, ...] = ()
-    coupled: KernelIR | None = None
+    coupling_kernel: KernelIR | None = None
 
     @property
-    def remembers(self) -> bool:
+    def uses_memory(self) -> bool:
         """Whether the motion depends on memory in addition to the state."""
-        return self.n_memory > (self.strained >= 0)
+        return self.n_memory > (self.strain_index >= 0)
 
     @property
-    def chosen(self) -> range:
+    def inactive_row_indices(self) -> range:
         """Indices in memory of the inactive constraint rows."""
         firsts = [closure.choice[0] for closure in self.closures if closure.choice is not None]
         return range(firsts[0], firsts[-1] + DIRECTIONS) if firsts else range(0)
 
     @property
-    def closes(self) -> bool:
+    def has_loops(self) -> bool:
         """Whether there are closed loops."""
         return bool(self.closures or self.couplings)
 
-    def awake(self, place: int) -> System:
+    def with_active_body(self, place: int) -> System:
         """System in which the body at a position is not idle."""
         bodies = tuple(
-            replace(run, alike=(replace(run.alike[0], idle=False),))
-            if run.place == place and run.count == 1 else run
+            replace(run, members=(replace(run.members[0], idle=False),))
+            if run.position == place and run.count == 1 else run
             for run in self.bodies
         )  # fmt: skip
         return replace(self, bodies=bodies)
@@ -395,31 +400,31 @@ class System:
     @property
     def count(self) -> int:
         """Number of bodies."""
-        return self.bodies[-1].place + self.bodies[-1].count if self.bodies else 0
+        return self.bodies[-1].position + self.bodies[-1].count if self.bodies else 0
 
     @property
-    def dragged(self) -> list[int]:
+    def bodies_with_drag(self) -> list[int]:
         """Positions of the flexible bodies with viscous drag."""
         has_drag = self.rows(lambda body: body.modal is not None and body.modal.drag is not None)
         return [int(place) for place in np.flatnonzero(has_drag)]
 
     @property
-    def steady(self) -> bool:
+    def is_autonomous(self) -> bool:
         """Whether nothing depends on time: drives, expressions, couplings and force elements."""
         unknown_elements = any(force.element not in _TIME_INDEPENDENT for force in self.forces)
-        timed_coupling = self.coupled is not None and reads_port(self.coupled, "t")
-        return not (self.driven or self.timed or unknown_elements or timed_coupling)
+        timed_coupling = self.coupling_kernel is not None and reads_port(self.coupling_kernel, "t")
+        return not (self.driven or self.has_timed_loads or unknown_elements or timed_coupling)
 
     @property
-    def timed(self) -> bool:
+    def has_timed_loads(self) -> bool:
         """Whether an expression of an effort or load depends on time."""
         kernels = [self.values, *(force.effort for force in self.forces)]
         reads_time = any(kernel is not None and reads_port(kernel, "t") for kernel in kernels)
-        return reads_time and self.by_time
+        return reads_time and self.depends_on_time
 
     def inputs_at(self, t: float) -> Array:
         """Numbers of all inputs at a time (s), as expressions read them."""
-        return np.array([x for channel in self.inputs for x in channel.at(t)])
+        return np.array([x for channel in self.inputs for x in channel.piece_at(t)])
 
     @property
     def n_values(self) -> int:
@@ -427,51 +432,51 @@ class System:
         return 0 if self.values is None else self.values.outputs[0].length()
 
     @cached_property
-    def _starts(self) -> list[int]:
-        return [run.place for run in self.bodies]
+    def _run_positions(self) -> list[int]:
+        return [run.position for run in self.bodies]
 
     def body(self, place: int) -> BodyNumbers:
         """Numbers of the body at a position."""
-        run = self.bodies[bisect_right(self._starts, place) - 1]
-        return run.member(place - run.place)
+        run = self.bodies[bisect_right(self._run_positions, place) - 1]
+        return run.member(place - run.position)
 
     @property
     def distinct(self) -> Iterator[BodyNumbers]:
         """Distinct bodies; equal members of a chain appear once."""
         for run in self.bodies:
-            yield from run.alike
+            yield from run.members
 
     @property
     def parents(self) -> Integers:
         """Position of every body's parent (count,), -1 for the ground."""
         parents = np.arange(-1, self.count - 1)
         for run in self.bodies:
-            parents[run.place] = run.parent
+            parents[run.position] = run.parent
         return parents
 
     @property
-    def places(self) -> dict[str, Integers]:
+    def first_indices(self) -> dict[str, Integers]:
         """Index of every body's first coordinate "q" and first speed "u" (count,)."""
         q, u = np.zeros((2, self.count), dtype=np.int64)
         for run in self.bodies:
-            members, slots = slice(run.place, run.place + run.count), run.slots
+            members, slots = slice(run.position, run.position + run.count), run.slots
             is_single = run.count == 1
-            q[members] = slots.q if is_single else slots.q_places()
-            u[members] = slots.u if is_single else slots.u_places()
+            q[members] = slots.q if is_single else slots.q_starts()
+            u[members] = slots.u if is_single else slots.u_starts()
         return {"q": q, "u": u}
 
     @property
-    def which(self) -> Integers:
+    def distinct_indices(self) -> Integers:
         """Index of every body in `distinct` (count,)."""
         indices, first = np.zeros(self.count, dtype=np.int64), 0
         for run in self.bodies:
             if run.count == 1:
-                indices[run.place] = first
+                indices[run.position] = first
             else:
-                indices[run.place : run.place + run.count] = first + run.which
-            first += len(run.alike)
+                indices[run.position : run.position + run.count] = first + run.member_indices
+            first += len(run.members)
         return indices
 
     def rows(self, number: Callable[[BodyNumbers], Any]) -> NDArray[Any]:
         """Array (count, ...) of a number, or a fixed number of them, of every body."""
-        return np.array([number(body) for body in self.distinct])[self.which]
+        return np.array([number(body) for body in self.distinct])[self.distinct_indices]

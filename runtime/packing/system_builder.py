@@ -31,7 +31,7 @@ from .loops.cut_tree import cut_loops
 from .loops.loop_detection import may_have_loops
 from .merging import link_detection
 from .merging.right_angle_snapping import with_right_angles
-from .merging.simplification import LINKED, LINKS, TURNS, WELDS, Simplification, Words
+from .merging.simplification import LINKED, LINKS, TURNS, WELDS, Simplification, SimplifyOptions
 from .merging.welded_bodies import WeldedBodies, contract_tree, find_welded_bodies
 from .node_layout import build_layout
 from .scene_elements import Elements, Known
@@ -57,7 +57,7 @@ def expansion_of(scene: Scene, flexible: Mapping[str, ModalBody] | None = None) 
     else:
         bodies = {n: body for n, body in flexible.items() if n not in substitution.one_way}
     expanded = expand(nodes, bodies, cuts)
-    expanded.described, expanded.rigidified = scene, substitution
+    expanded.user_scene, expanded.rigidified = scene, substitution
     expanded.nodes |= substitution.nodes
     return expanded
 
@@ -69,7 +69,7 @@ def system_of(
     align: bool = True,
     flexible: Mapping[str, ModalBody] | None = None,
     moving: Mapping[int, Any] | None = None,
-    simplify: Words = LINKED,
+    simplify: SimplifyOptions = LINKED,
 ) -> tuple[System, Frames]:
     """Build the system of a scene, and the positions of all its parts.
 
@@ -95,8 +95,8 @@ def system_of(
         )
     frames = Frames(
         nodes, tree, layout, elements, releases, Lookup(nodes.bodies, bodies.placement),
-        Lookup(nodes.bodies, tree.place_of_body), Lookup(nodes.hinges, tree.place_of_hinge),
-        expanded, (*carried.told(nodes), *simplifications), simplify,
+        Lookup(nodes.bodies, tree.position_of_body), Lookup(nodes.hinges, tree.position_of_hinge),
+        expanded, (*carried.simplifications(nodes), *simplifications), simplify,
     )  # fmt: skip
     ports = [Port(MOVING, (1 + max(moving),))] if moving else []
     driven, values = list(_driven_coordinates(nodes, tree)), Values(layout, ports)
@@ -105,7 +105,7 @@ def system_of(
     n_memory += strained >= 0
     laws = tuple(law_runs(nodes, tree, layout, values, n_memory))
     loads = tuple(_load_numbers(frames, load, values) for load in nodes.load)
-    held = _held_inputs(scene, laws[-1].next_twist if laws else n_memory)
+    held = _held_inputs(scene, laws[-1].next_angle_index if laws else n_memory)
     couplings, coupled = coupling_numbers(frames, runs)
     system = System(
         layout.nq, layout.nu, held.first + len(held.start), strained, nodes.gravity, runs,
@@ -120,7 +120,7 @@ def system_of(
 
 
 def _with_right_angles(
-    expanded: ExpandedScene, simplify: Words
+    expanded: ExpandedScene, simplify: SimplifyOptions
 ) -> tuple[ExpandedScene, list[Simplification]]:
     if TURNS not in simplify:
         return expanded, []
@@ -135,7 +135,7 @@ def _held_inputs(scene: Scene, first: int) -> HeldInputs:
     """
     places, start = dict.fromkeys(scene.channels, -1), list[float]()
     for controller in scene.controller:
-        start += [math.nan, *controller.filled["initial"]]
+        start += [math.nan, *controller.complete_matrices["initial"]]
         for name in controller.outputs:
             places[name] = first + len(start)
             start.append(scene.channels[name].value(0.0))
@@ -146,7 +146,7 @@ def has_timed_loads(scene: Scene, inputs: Inputs) -> bool:
     """Whether an effort or load depends on time, or on an input that is not constant."""
     active = (a for a in active_expressions(scene) if not (a.drive or a.condition))
     names = {name.text for load in active for name in load.expression.names}
-    return "t" in names or any(not inputs[name].stands for name in names & inputs.keys())
+    return "t" in names or any(not inputs[name].is_constant for name in names & inputs.keys())
 
 
 def _driven_coordinates(scene: Scene, tree: Topology) -> Iterator[tuple[int, int, Expression]]:
@@ -163,12 +163,12 @@ def _driven_hinges(scene: Scene, tree: Topology) -> Iterator[tuple[int, HingeTab
     for run in tree.runs:
         if run.hinge < single_hinges:
             if scene.hinge[run.hinge].drive is not None:
-                yield run.place, scene.hinge[run.hinge]
+                yield run.position, scene.hinge[run.hinge]
             continue
         chain = scene.chain[scene.hinges.member(run.hinge)[0]]
         if any(table.drive is not None for table in chain.hinge):
             for k in range(run.count):
-                yield run.place + k, chain.hinge_of(k)
+                yield run.position + k, chain.hinge_of(k)
 
 
 def _load_numbers(frames: Frames, load: Load, values: Values) -> LoadNumbers:
@@ -180,7 +180,7 @@ def _load_numbers(frames: Frames, load: Load, values: Values) -> LoadNumbers:
     axes, own, _ = frames.end(reference)
     return LoadNumbers(
         body, axes, _section_axes(frames, reference) or own, offset,
-        tuple(map(values.place, load.force)), tuple(map(values.place, load.moment)),
+        tuple(map(values.value_index, load.force)), tuple(map(values.value_index, load.moment)),
     )  # fmt: skip
 
 

@@ -20,7 +20,7 @@ class Interrupt:
     def __init__(self) -> None:
         self.heard, self._came = False, False
 
-    def come(self) -> None:
+    def received(self) -> None:
         """Record that a signal has arrived."""
         self._came = True
 
@@ -83,7 +83,7 @@ class record_interrupts:
     def _note(self, which: int, _: object) -> None:
         self._came = which
         for flag in (self._told, *_open_flags):
-            flag.come()
+            flag.received()
         if not self._since:
             self._since = time.monotonic()
         elif time.monotonic() - self._since > MAX_INTERRUPT_DELAY:

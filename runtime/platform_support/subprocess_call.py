@@ -56,7 +56,7 @@ def run_in_subprocess(what: str, work: Callable[..., Outcome], *arguments: Any) 
                 what,
                 process_result.signal()
                 if process_result.code < 0
-                else _last_line(process_result.said),
+                else _last_line(process_result.output),
             )
         is_success, result = pickle.loads(result_path.read_bytes())
     if not is_success:

@@ -32,7 +32,7 @@ class ProcessResult:
     """Exit code of a program, -n if signal n ended it, and the beginning of its output."""
 
     code: int
-    said: str
+    output: str
 
     def signal(self) -> str:
         """Name of the signal that ended the program."""

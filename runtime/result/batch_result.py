@@ -14,7 +14,7 @@ from mstmm.argument_validation import require_path
 from mstmm.array_validation import Array, integer
 from mstmm.errors import SceneError
 from mstmm.optional_packages import missing_package_error
-from mstmm.risk import RUN, AssessedAnswer, Risk
+from mstmm.risk import RUN, AssessedResult, Risk
 
 from ..integrate.c_loop import Statistics, Status
 from ..run.batch.batch_run import BatchData
@@ -44,14 +44,14 @@ class BatchRun(Record):
     @property
     def certificate(self) -> Certificate:
         """Raise SceneError: runs of a batch have no certificate."""
-        raise SceneError("runs of a batch have no certificate; simulate this one alone")
+        raise SceneError("runs of a batch have no certificate; simulate this run alone")
 
-    def candidates(self) -> list[Candidate]:
+    def default_quantities(self) -> list[Candidate]:
         """Default quantities of a plot."""
         return default_candidates(self)
 
 
-class BatchResult(AssessedAnswer, BatchData):
+class BatchResult(AssessedResult, BatchData):
     """Results of n runs, with all quantities of single runs except the work.
 
     Values are nan at times that a run did not reach. The runs are not checked, so a batch is never
@@ -64,31 +64,31 @@ class BatchResult(AssessedAnswer, BatchData):
         for k in np.flatnonzero(~np.asarray(self.success)).tolist():
             yield Risk(
                 "run-failed", f"run {k}", f"run {k} failed: {self.messages[k]}",
-                "simulate it alone", figure=k,
+                "simulate this run alone", value=k,
             )  # fmt: skip
         yield Risk(
-            "unexamined", RUN, "runs of a batch are not examined: their balances and errors are "
+            "unexamined", RUN, "runs of a batch are not checked: their drifts and errors are "
             "unknown", "simulate single runs with certify=True",
         )  # fmt: skip
 
-    def run(self, k: int) -> BatchRun:
+    def result(self, k: int) -> BatchRun:
         """Run k with its own model, as a result with names and quantities but no certificate.
 
         Raises SceneError for an invalid index, and for models with one-way bodies.
         """
         count = len(self.q)
-        expected = f"the number of one of {count} runs, from 0 on"
+        expected = f"the index of a run, 0 to {count - 1}"
         k = integer("run", k, -count, expected)
         if k >= count:
             raise SceneError(f"run = {k}: expected {expected}")
         k %= count
-        model, reached = self.models.of(k), self._reached(k)
-        expanded = model.packed.expanded
+        model, reached = self.models.model_of_run(k), self._finite_samples(k)
+        expanded = model.packed_scene.expanded
         rigid = None if expanded is None else expanded.rigidified
         if rigid is not None and rigid.one_way:
             raise SceneError(
-                'bodies of flexibility "one-way" respond to single runs: simulate this one alone, '
-                'or use flexibility = "coupled"'
+                'bodies of flexibility "one-way" respond in single runs only: simulate this run '
+                'alone, or use flexibility = "coupled"'
             )
         count, no_work = int(reached.sum()), np.full(int(reached.sum()), np.nan)
         statistics: dict[str, Any] = dict.fromkeys(Statistics.__dataclass_fields__, 0)
@@ -108,9 +108,11 @@ class BatchResult(AssessedAnswer, BatchData):
         )
         return BatchRun(model, trajectory)
 
-    def names(self) -> tuple[str, ...]:
+    def quantity_names(self) -> tuple[str, ...]:
         """Names accepted by `quantity` and `plot`."""
-        return tuple(name for name in self.run(0).names() if name not in _ABSENT_QUANTITIES)
+        return tuple(
+            name for name in self.result(0).quantity_names() if name not in _ABSENT_QUANTITIES
+        )
 
     def quantity(self, name: str) -> Quantity:
         """Values (n, m) or (n, m, k) with unit; SceneError with the nearest name if unknown."""
@@ -126,14 +128,14 @@ class BatchResult(AssessedAnswer, BatchData):
             import xarray
         except ImportError as error:
             raise missing_package_error("io", "an xarray Dataset", error) from None
-        first = self.run(0)
+        first = self.result(0)
         variables, labels = xarray_dataset.dataset_variables(first)
         labels["time"] = (labels["time"][0], self.t, labels["time"][2])
         stacked: dict[str, Any] = {}
         for k in range(len(self.q)):
             run_variables, reached = (
-                xarray_dataset.dataset_variables(self.run(k))[0] if k else variables,
-                self._reached(k),
+                xarray_dataset.dataset_variables(self.result(k))[0] if k else variables,
+                self._finite_samples(k),
             )
             for name, (dims, values, attributes) in run_variables.items():
                 if name in _ABSENT_QUANTITIES or dims[:1] != ("time",):
@@ -180,22 +182,24 @@ class BatchResult(AssessedAnswer, BatchData):
 
         selection, run_indices = (
             PlotSelection(names),
-            [k for k in range(len(self.q)) if self._reached(k).any()],
+            [k for k in range(len(self.q)) if self._finite_samples(k).any()],
         )
         _reject_absent(names)
         if not run_indices:
-            raise SceneError("there is nothing to plot: no run has a state; see messages")
+            raise SceneError("nothing to plot: no run has a state; see messages")
         if band if band is not None else len(self.q) > _MAX_LINES:
             figure = compose_panels(self._bands(selection, run_indices), title, ax)
         else:
-            figure = draw_runs({f"run {k}": self.run(k) for k in run_indices}, selection, title, ax)
+            figure = draw_runs(
+                {f"run {k}": self.result(k) for k in run_indices}, selection, title, ax
+            )
         if path is not None:
             figure.write(Path(path))
         return figure.figure
 
-    def _bands(self, wanted: PlotSelection, there: Sequence[int]) -> list[Panel]:
-        longest = max(there, key=lambda k: self._reached(k).sum())
-        panel_list = build_panels({"run": self.run(longest)}, wanted)
+    def _bands(self, selection: PlotSelection, there: Sequence[int]) -> list[Panel]:
+        longest = max(there, key=lambda k: self._finite_samples(k).sum())
+        panel_list = build_panels({"run": self.result(longest)}, selection)
         quantities = iter(self._quantities([name for panel in panel_list for name in panel.names]))
         band_label = (
             f"median and {_BAND_PERCENTILES[0]:g} to {_BAND_PERCENTILES[1]:g} % of "
@@ -209,7 +213,7 @@ class BatchResult(AssessedAnswer, BatchData):
             for panel in panel_list
         ]  # fmt: skip
 
-    def _reached(self, k: int) -> Any:
+    def _finite_samples(self, k: int) -> Any:
         """Mask (m,) of the output times at which run k has a finite state."""
         return np.isfinite(self.q[k]).all(axis=1) & np.isfinite(self.u[k]).all(axis=1)
 
@@ -221,7 +225,7 @@ class BatchResult(AssessedAnswer, BatchData):
         templates: list[Quantity] = []
         values: list[Array] = []
         for k in range(len(self.q)):
-            run, reached = self.run(k), self._reached(k)
+            run, reached = self.result(k), self._finite_samples(k)
             quantities = [run.quantity(name) for name in names]
             if not k:
                 templates = quantities
@@ -241,7 +245,7 @@ class BatchResult(AssessedAnswer, BatchData):
 def _reject_absent(names: Sequence[str]) -> None:
     for name in names:
         if name in _ABSENT_QUANTITIES:
-            raise SceneError(f'"{name}": batches do not integrate it; simulate one alone')
+            raise SceneError(f'"{name}": not integrated in batches; simulate single runs')
 
 
 def _band_traces(t: Array, quantities: Sequence[Quantity]) -> Iterator[Trace]:

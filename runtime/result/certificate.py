@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 from mstmm.array_validation import finite_float
 from mstmm.notebook_html import NotebookDisplay, table
+from mstmm.plain_data import stored_as
 from mstmm.risk import Risk, order_risks, sentences
 
 from ..integrate.achieved_error import AchievedError
@@ -30,53 +31,56 @@ class Certificate(NotebookDisplay):
     Attributes:
         energy: residual of kinetic + potential energy - work (J), relative to the energy exchanged.
         momentum: drift of every conserved component of linear and angular momentum.
-        quaternion_residual: largest | |quaternion| - 1 | in the samples before normalisation.
-        pivot: largest loss of digits in the sweep: about 1e-16 times its ratio.
-        singular: closest approach to a coordinate singularity (gimbal).
-        step: fixed step compared with the fastest motion at the start; None for adaptive runs.
-        later: the same at the first sample for which the step is too long; None if there is none.
+        quaternion_drift: largest | |quaternion| - 1 | in the samples before normalisation.
+        pivot_loss: largest loss of digits in the sweep: about 1e-16 times its ratio.
+        singularity_distance: closest approach to a coordinate singularity (gimbal).
+        step_stability: fixed step compared with the fastest motion at the start; None for adaptive
+            runs.
+        later_step_stability: the same at the first sample for which the step is too long; None if
+            there is none.
         stability_limited: whether stability, not accuracy, limited many of the steps; not available
             for runs that chose their methods themselves.
         sum_of_local_errors: in the mixed units of q and u; NOT the error of the result, which may
             be larger by any factor.
         error: estimate of the error from a second run; None unless requested (certify=True).
-        finite: whether all values of q and u are finite.
-        too_large: whether the scene has too many bodies for a check of the pivots.
-        samples: number of samples; balances need two.
-        end: the run's own message.
-        flexible: validity range of the model of each flexible body.
-        give: deflection of the stiffest spring, which the estimated error does not include; None
-            without a spring.
+        is_finite: whether all values of q and u are finite.
+        pivots_not_checked: whether the scene has too many bodies for a check of the pivots.
+        sample_count: number of samples; balances need two.
+        message: the run's own message.
+        flexible_bodies: validity range of the model of each flexible body.
+        spring_deflection: deflection of the stiffest spring, which the estimated error does not
+            include; None without a spring.
         failures: reasons why the run, or some of its samples, cannot be used at all.
-        models: findings about models of the scene outside their range in any run.
-        known: findings about the scene and its start before the run, and those of the run itself.
-        reached: achieved error for a target error (error=...); None without a target.
-        closure: loop closure error, and the number of indeterminate reactions; None for trees.
-        control: step control, which determines the expected drift of the balances.
+        model_risks: findings about models of the scene outside their range in any run.
+        prior_risks: findings about the scene and its start before the run, and those of the run
+            itself.
+        achieved_error: achieved error for a target error (error=...); None without a target.
+        loop_closure: loop closure error, and the number of indeterminate reactions; None for trees.
+        step_control: step control, which determines the expected drift of the balances.
     """
 
     energy: Drift
     momentum: tuple[Drift, ...]
-    quaternion_residual: float
-    pivot: PivotLoss | None
-    singular: SingularDistance | None
-    step: StepCheck | None
+    quaternion_drift: float = field(metadata=stored_as("quaternion_residual"))
+    pivot_loss: PivotLoss | None = field(metadata=stored_as("pivot"))
+    singularity_distance: SingularDistance | None = field(metadata=stored_as("singular"))
+    step_stability: StepCheck | None = field(metadata=stored_as("step"))
     stability_limited: bool
     sum_of_local_errors: float | None
     error: ErrorEstimate | None
-    finite: bool
-    end: str
-    control: StepControl
-    later: StepCheck | None = None
-    too_large: bool = False
-    samples: int = 2
-    flexible: tuple[ModelRange, ...] = ()
-    give: SpringDeflection | None = None
+    is_finite: bool = field(metadata=stored_as("finite"))
+    message: str = field(metadata=stored_as("end"))
+    step_control: StepControl = field(metadata=stored_as("control"))
+    later_step_stability: StepCheck | None = field(default=None, metadata=stored_as("later"))
+    pivots_not_checked: bool = field(default=False, metadata=stored_as("too_large"))
+    sample_count: int = field(default=2, metadata=stored_as("samples"))
+    flexible_bodies: tuple[ModelRange, ...] = field(default=(), metadata=stored_as("flexible"))
+    spring_deflection: SpringDeflection | None = field(default=None, metadata=stored_as("give"))
     failures: tuple[str, ...] = ()
-    models: tuple[Risk, ...] = ()
-    known: tuple[Risk, ...] = ()
-    reached: AchievedError | None = None
-    closure: Closure | None = None
+    model_risks: tuple[Risk, ...] = field(default=(), metadata=stored_as("models"))
+    prior_risks: tuple[Risk, ...] = field(default=(), metadata=stored_as("known"))
+    achieved_error: AchievedError | None = field(default=None, metadata=stored_as("reached"))
+    loop_closure: Closure | None = field(default=None, metadata=stored_as("closure"))
 
     def verdict(self, accuracy: float = DEFAULT_ACCURACY, balance: float | None = None) -> Verdict:
         """Verdict on whether the result can be used.
@@ -85,10 +89,8 @@ class Certificate(NotebookDisplay):
         and `balance` (relative, of energy and momentum; None for the bound of the run's own
         tolerance or step).
         """
-        given = None if balance is None else finite_float("balance", balance, "a part")
-        return _verdict(
-            self, finite_float("accuracy", accuracy, "rad, or a part of the motion"), given
-        )
+        given = None if balance is None else finite_float("balance", balance, "a number")
+        return _verdict(self, finite_float("accuracy", accuracy, "a number in rad"), given)
 
     @property
     def trusted(self) -> bool:
@@ -98,24 +100,30 @@ class Certificate(NotebookDisplay):
     @cached_property
     def risks(self) -> tuple[Risk, ...]:
         """Findings about the run, objections first; empty for a clean run."""
-        pivot, singular = self.pivot, self.singular
+        pivot, singular = self.pivot_loss, self.singularity_distance
         if pivot and singular and singular.risk and pivot.hinge == singular.hinge:
             pivot = None  # the pivot vanishes at a singularity
-        is_too_long_at_start = self.step is not None and self.step.risk is not None
-        checked = (pivot, singular, self.step if is_too_long_at_start else self.later)
+        is_too_long_at_start = (
+            self.step_stability is not None and self.step_stability.risk is not None
+        )
+        checked = (
+            pivot,
+            singular,
+            self.step_stability if is_too_long_at_start else self.later_step_stability,
+        )
         return order_risks((
-            *finiteness_risks(self.finite, self.reached), *self.known,
-            *misfit_risks(self.closure, self.known),
-            *balance_risks((self.energy, *self.momentum), self.control, self.closure),
-            *quaternion_risks(self.quaternion_residual),
+            *finiteness_risks(self.is_finite, self.achieved_error), *self.prior_risks,
+            *misfit_risks(self.loop_closure, self.prior_risks),
+            *balance_risks((self.energy, *self.momentum), self.step_control, self.loop_closure),
+            *quaternion_risks(self.quaternion_drift),
             *(x.risk for x in checked if x is not None and x.risk is not None),
-            *flexible_risks.flexibility_risks(self.flexible), *self.models,
+            *flexible_risks.flexibility_risks(self.flexible_bodies), *self.model_risks,
         ))  # fmt: skip
 
     @property
-    def doubts(self) -> tuple[str, ...]:
+    def objections(self) -> tuple[str, ...]:
         """Objections to the result, one sentence each."""
-        return sentences(risk for risk in self.risks if risk.doubt)
+        return sentences(risk for risk in self.risks if risk.invalidates)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -125,19 +133,19 @@ class Certificate(NotebookDisplay):
     @property
     def predictable_until(self) -> float | None:
         """Time (s) after which two accurate runs diverge; None without divergence or second run."""
-        return None if self.error is None else self.error.horizon
+        return None if self.error is None else self.error.divergence_time
 
     @property
-    def covers(self) -> str:
+    def error_scope(self) -> str:
         """Scope of the error estimate, and what it does not include."""
         return _error_scope(self)
 
     def __str__(self) -> str:
-        return self.text()
+        return self.as_text()
 
-    def text(self, verdict: bool = True, warnings: bool = True) -> str:
+    def as_text(self, verdict: bool = True, warnings: bool = True) -> str:
         """Certificate as text, one line per name; the verdict first."""
-        rows = self.rows(verdict, warnings)
+        rows = self.as_pairs(verdict, warnings)
         width = max(len(name) for name, _ in rows)
         return "\n".join(f"{name.ljust(width)}  {text}" for name, text in rows)
 
@@ -145,33 +153,36 @@ class Certificate(NotebookDisplay):
         return str(self)
 
     def _repr_html_(self) -> str:
-        return table(self.rows())
+        return table(self.as_pairs())
 
-    def rows(self, verdict: bool = True, warnings: bool = True) -> list[tuple[str, str]]:
+    def as_pairs(self, verdict: bool = True, warnings: bool = True) -> list[tuple[str, str]]:
         """Certificate as pairs (name, text)."""
-        not_determined = "not determined: one sample tells of no change; ask for more output times"
+        not_determined = "not determined: the run has only one sample; give more output times"
         rows = [("verdict", str(self.verdict()))] if verdict else []
-        rows.append(("run", self.end))
-        rows.append(("energy balance", not_determined if self.samples < 2 else str(self.energy)))
-        if self.samples > 1:
+        rows.append(("run", self.message))
+        rows.append(
+            ("energy balance", not_determined if self.sample_count < 2 else str(self.energy))
+        )
+        if self.sample_count > 1:
             rows += [(d.name, str(d)) for d in self.momentum]
-        if self.quaternion_residual:
-            rows.append(("quaternion length", f"within {self.quaternion_residual:.1e} of 1"))
-        if self.closure is not None:
-            rows.append(("closed loops", str(self.closure)))
-        if self.pivot is not None:
-            rows.append(("pivot ratio", f'{self.pivot.ratio:.1e} at hinge "{self.pivot.hinge}"'))
-        elif self.too_large:
-            rows.append(("pivot ratio", f"not computed for more than {MAX_CHECKED_BODIES} bodies"))
-        if self.singular is not None:
+        if self.quaternion_drift:
+            rows.append(("quaternion length", f"within {self.quaternion_drift:.1e} of 1"))
+        if self.loop_closure is not None:
+            rows.append(("closed loops", str(self.loop_closure)))
+        if self.pivot_loss is not None:
             rows.append(
-                ("singular angle", f'{self.singular.measure:.1e} at "{self.singular.hinge}"')
+                ("pivot ratio", f'{self.pivot_loss.ratio:.1e} at hinge "{self.pivot_loss.hinge}"')
             )
-        if self.step is not None:
-            rows.append(("h |lambda| at the start", f"{self.step.product:.3g}"))
+        elif self.pivots_not_checked:
+            rows.append(("pivot ratio", f"not computed for more than {MAX_CHECKED_BODIES} bodies"))
+        if self.singularity_distance is not None:
+            singular = self.singularity_distance
+            rows.append(("singular angle", f'{singular.measure:.1e} at "{singular.hinge}"'))
+        if self.step_stability is not None:
+            rows.append(("h |lambda| at the start", f"{self.step_stability.product:.3g}"))
         if self.sum_of_local_errors is not None:
             rows.append(("sum of local errors", f"{self.sum_of_local_errors:.1e} (not the error)"))
-        rows += model_range.rows(self.flexible)
+        rows += model_range.rows(self.flexible_bodies)
         rows += _error_rows(self)
         rows += [("warning", text) for text in self.warnings] if warnings else []
         return rows
@@ -186,23 +197,25 @@ def _verdict(c: Certificate, accuracy: float, balance: float | None) -> Verdict:
     `accuracy` of the error in rad, for coordinates other than angles relative to their range;
     `balance` of energy and momentum, relative.
     """
-    balance_bound = c.control.bound if balance is None else balance
+    balance_bound = c.step_control.bound if balance is None else balance
     objections = list(c.failures) + [
-        f"{d.name} changes by {d}, more than the {balance_bound:g} asked for"
+        f"{d.name} drifts by {d}, more than the requested bound {balance_bound:g}"
         for d in (c.energy, *c.momentum)
-        if balance_bound < d.relative <= c.control.bound
+        if balance_bound < d.relative <= c.step_control.bound
     ]
     missing = []
-    if c.samples < 2:
-        missing.append("one sample tells nothing of energy and momentum")
+    if c.sample_count < 2:
+        missing.append(
+            "the run has only one sample, so that energy and momentum cannot be compared"
+        )
     if c.error is not None:
         objections += _uncovered_objections(c.error) + _accuracy_objections(c, accuracy)
-    elif c.reached is None:
-        missing.append("no second run has told its error (certify=True)")
-    objections += c.doubts
+    elif c.achieved_error is None:
+        missing.append("the error was not estimated (use certify=True)")
+    objections += c.objections
     bounds = f"errors within {accuracy:g} rad or {accuracy:.3g} of the motion"
-    if c.reached is not None:
-        bounds = f"the error of {c.reached.of} as asked for"
+    if c.achieved_error is not None:
+        bounds = f"error of {c.achieved_error.quantity} as requested"
     return Verdict(
         tuple(dict.fromkeys(objections)),
         tuple(missing),
@@ -215,8 +228,8 @@ def _uncovered_objections(error: ErrorEstimate) -> list[str]:
     if error.covered is None:
         return []
     return [
-        f"the error is not known beyond t = {error.covered:.4g} s, where the second run ended; a "
-        "shorter run, or other tolerances, may let it end"
+        f"the error is unknown after t = {error.covered:.4g} s, where the second run stopped; use "
+        "a shorter run or other tolerances"
     ]
 
 
@@ -226,22 +239,25 @@ def _accuracy_objections(c: Certificate, accuracy: float) -> list[str]:
     objections = []
     for unit, values in c.error.q.items():
         worst = float(values.max(initial=0.0))
-        if worst > error_limit(c.error.moved, unit, accuracy, accuracy):
+        if worst > error_limit(c.error.excursion, unit, accuracy, accuracy):
             motion = (
-                "" if unit == "rad" else f" of {c.error.moved.get(unit, 0.0):.2g} {unit} of motion"
+                ""
+                if unit == "rad"
+                else f", with a motion of {c.error.excursion.get(unit, 0.0):.2g} {unit}"
             )
             objections.append(
-                f"the error of q may be {worst:.1e} {unit or '1'}{motion}{_horizon_note(c.error)}"
+                f"the estimated error of q is {worst:.1e} {unit or '1'}{motion}"
+                f"{_horizon_note(c.error)}"
             )
     return objections
 
 
 def _horizon_note(error: ErrorEstimate) -> str:
-    if error.horizon is None:
+    if error.divergence_time is None:
         return ""
-    if error.nowhere:
-        return " (not predictable beyond its start)"
-    return f" (predictable until {error.horizon:.4g} s)"
+    if error.diverges_at_start:
+        return " (not predictable from the start)"
+    return f" (predictable until {error.divergence_time:.4g} s)"
 
 
 # --- rows -----------------------------------------------------------------------------------------
@@ -249,27 +265,29 @@ def _horizon_note(error: ErrorEstimate) -> str:
 
 def _error_rows(c: Certificate) -> list[tuple[str, str]]:
     error = c.error
-    rows = [] if c.reached is None else [("error", str(c.reached))]
+    rows = [] if c.achieved_error is None else [("error", str(c.achieved_error))]
     if error is None:
-        scope_rows = [("what this covers", c.covers)]
-        missing = [("error", "not estimated (certify=True makes a second run)")]
+        scope_rows = [("scope of the error", c.error_scope)]
+        missing = [("error", "not estimated (certify=True estimates it by a second run)")]
         return rows + scope_rows if rows else missing
-    is_limited = error.horizon is not None and not error.nowhere
-    until = f" up to t = {error.horizon:.6g} s" if is_limited else ""
+    is_limited = error.divergence_time is not None and not error.diverges_at_start
+    until = f" up to t = {error.divergence_time:.6g} s" if is_limited else ""
     covered_span = "over the whole run"
     if error.covered is not None:
-        covered_span = f"up to t = {error.covered:.6g} s, none beyond"
+        covered_span = f"up to t = {error.covered:.6g} s, unknown afterwards"
         until = until or f" {covered_span}"
     for kind in ("q", "u"):
-        whole_run = f"; {_format_errors(error.whole(kind))} {covered_span}" if is_limited else ""
-        values = _format_errors(error.largest(kind) if is_limited else error.whole(kind))
+        whole_run = (
+            f"; {_format_errors(error.difference(kind))} {covered_span}" if is_limited else ""
+        )
+        values = _format_errors(error.largest(kind) if is_limited else error.difference(kind))
         if values:
             source = f" (from a second run, {error.reference})" if kind == "q" else ""
             rows.append((f"error of {kind}, at most", f"{values}{until}{whole_run}{source}"))
-    rows.append(("what this covers", c.covers))
-    if error.horizon is not None:
+    rows.append(("scope of the error", c.error_scope))
+    if error.divergence_time is not None:
         horizon_text = (
-            f"t = {error.horizon:.6g} s: later"
+            f"t = {error.divergence_time:.6g} s: afterwards"
             if is_limited
             else "the start: from the first sample on"
         )
@@ -277,12 +295,11 @@ def _error_rows(c: Certificate) -> list[tuple[str, str]]:
             (
                 "predictable until",
                 f"{horizon_text} the two runs differ by more than {ANGLE:g} rad or {PART:.0%} of "
-                f"the motion, "
-                "and errors have no meaning",
+                "the motion, and error estimates are not valid",
             )
         )
-    if error.tenfold is not None:
-        rows.append(("growth of errors", f"tenfold every {error.tenfold:.3g} s"))
+    if error.tenfold_time is not None:
+        rows.append(("growth of errors", f"tenfold every {error.tenfold_time:.3g} s"))
     return rows
 
 
@@ -292,12 +309,12 @@ def _format_errors(errors: dict[str, float]) -> str:
 
 def _error_scope(c: Certificate) -> str:
     """Scope of the error estimate, and what it does not include."""
-    parts = ["the integration in time, not how well the scene stands for what is meant"]
-    if c.flexible:
-        parts.append("not the shapes and frames of flexible bodies, whose rows say how far they go")
-    if c.give is not None:
+    parts = ["integration in time only, not the assumptions of the scene"]
+    if c.flexible_bodies:
+        parts.append("not the shape functions and frames of flexible bodies (see their rows)")
+    if c.spring_deflection is not None:
         parts.append(
-            "not what springs give by where they stand for constraints: the stiffest, "
-            f"{c.give.spring}, by up to {c.give.largest:.1e} m"
+            "not the deflection of springs that replace constraints: up to "
+            f"{c.spring_deflection.largest:.1e} m at the stiffest, {c.spring_deflection.spring}"
         )
     return "; ".join(parts)

@@ -20,20 +20,20 @@ class Drift:
     @property
     def relative(self) -> float:
         """Relative drift largest / scale; 0 if both vanish; nan if the quantity is not finite."""
-        if not self.known:
+        if not self.is_known:
             return np.nan
         if self.scale > 0:
             return self.largest / self.scale
         return np.inf if self.largest > 0 else 0.0
 
     @property
-    def known(self) -> bool:
+    def is_known(self) -> bool:
         """Whether the drift is known: no overflow, and at least one sample has a value."""
         return bool(np.isfinite(self.largest) and np.isfinite(self.scale))
 
     def __str__(self) -> str:
-        if not self.known:
-            return f"not determined: no finite {self.unit} in every sample that can be evaluated"
+        if not self.is_known:
+            return f"not determined: no sample has a finite value in {self.unit}"
         text = f"{self.largest:.1e} {self.unit} of {self.scale:.3g} {self.unit} {self.of_what}"
         return f"{text} ({self.relative:.1e})"
 

@@ -26,37 +26,37 @@ def build_certificate(result: Record, error: ErrorEstimate | None) -> Certificat
     return Certificate(
         energy=energy_drift(result),
         momentum=tuple(momentum_drifts(result)),
-        quaternion_residual=run.norm_residual,
-        pivot=pivot_loss(result.model, run),
-        singular=singular_distance(result.model, run),
-        step=result._step,
-        later=check_later(result.model.looped, run),
+        quaternion_drift=run.norm_residual,
+        pivot_loss=pivot_loss(result.model, run),
+        singularity_distance=singular_distance(result.model, run),
+        step_stability=result._step,
+        later_step_stability=check_later(result.model.looped, run),
         stability_limited=(
             statistics is not None and statistics.stability_limited and not run.methods
         ),
         sum_of_local_errors=_finite_local_error_sum(statistics),
         error=error,
-        finite=bool(np.isfinite(run.q).all() and np.isfinite(run.u).all()),
-        end=result.message,
-        control=step_control(run.settings, run.reached),
-        too_large=len(result.model.scene.bodies) > MAX_CHECKED_BODIES,
-        samples=len(result.t),
-        flexible=model_range.model_ranges(result._flexible),
-        give=spring_deflection.stiffest_spring_deflection(result),
+        is_finite=bool(np.isfinite(run.q).all() and np.isfinite(run.u).all()),
+        message=result.message,
+        step_control=step_control(run.settings, run.achieved_error),
+        pivots_not_checked=len(result.model.scene.bodies) > MAX_CHECKED_BODIES,
+        sample_count=len(result.t),
+        flexible_bodies=model_range.model_ranges(result._flexible),
+        spring_deflection=spring_deflection.stiffest_spring_deflection(result),
         failures=() if result.success else (result.message,),
-        models=result._outside(),
-        known=(
+        model_risks=result._model_risks(),
+        prior_risks=(
             *run.risks,
             *missed_feature_risks(result.model, run),
             *find_pulling_contacts(result),
             *output_risks(run, result.outputs()),
         ),
-        reached=run.reached,
-        closure=loop_closure(result.model, run),
+        achieved_error=run.achieved_error,
+        loop_closure=loop_closure(result.model, run),
     )
 
 
 def _finite_local_error_sum(statistics: Statistics | None) -> float | None:
     """Sum of local errors; None where it is not finite or there are no statistics."""
-    total = None if statistics is None else statistics.sum_local_error
+    total = None if statistics is None else statistics.sum_of_local_errors
     return total if total is not None and np.isfinite(total) else None

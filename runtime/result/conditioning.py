@@ -10,13 +10,14 @@ accelerations is about 1e-16 times the propagated rounding in D over D.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mstmm.array_validation import Array
+from mstmm.plain_data import stored_as
 from mstmm.risk import Risk
 
 from .flexible.modal_pivots import ModalPivots
@@ -57,30 +58,30 @@ class PivotLoss:
     ratio: float
     hinge: str
     time: float
-    refines: int = 0
+    is_refined: int = field(default=0, metadata=stored_as("refines"))
 
     @property
     def error(self) -> float:
         """Relative error of the accelerations; each refinement multiplies it by the initial one."""
-        return min(1e-16 * self.ratio, 1.0) ** (1 + self.refines)
+        return min(1e-16 * self.ratio, 1.0) ** (1 + self.is_refined)
 
     @property
     def sweep(self) -> str:
         """Name of the sweep that avoids this loss of digits."""
-        return "qr" if self.refines or self.ratio > MAX_REFINED_LOSS else "refined"
+        return "qr" if self.is_refined or self.ratio > MAX_REFINED_LOSS else "refined"
 
     @property
     def risk(self) -> Risk | None:
         """Finding that digits are lost; None for a loss up to `MAX_PIVOT_LOSS`."""
         if not self.error > 1e-16 * MAX_PIVOT_LOSS:
             return None
-        refined = f", refined {self.refines} times" if self.refines else ""
+        refined = f" after {self.is_refined} refinements" if self.is_refined else ""
         return Risk(
             "pivot-loss", f'hinge "{self.hinge}"',
-            f'hinge "{self.hinge}" carries {self.ratio:.0e} times what its motion feels (a heavy '
-            f"body behind light ones): accelerations may err by {self.error:.0e} of their "
-            f"size{refined}", f'sweep = "{self.sweep}" keeps them (explicit methods); or, where '
-            "the root is free, make the heavy body the first one", self.ratio, MAX_PIVOT_LOSS,
+            f'hinge "{self.hinge}": mass ratio {self.ratio:.0e}, heavy body outboard of light '
+            f"ones: relative error of accelerations up to {self.error:.0e}{refined}",
+            f'use sweep = "{self.sweep}" (explicit methods); or, if the root is free, make the '
+            "heavy body the first one", self.ratio, MAX_PIVOT_LOSS,
         )  # fmt: skip
 
 
@@ -95,15 +96,15 @@ class SingularDistance:
     measure: float
     hinge: str
     time: float
-    turned: float = 0.0
+    rotation_per_step: float = field(default=0.0, metadata=stored_as("turned"))
 
     @property
     def risk(self) -> Risk | None:
         """Finding on a coordinate singularity or on fixed steps too long near one; else None."""
         approach = (
-            f'hinge "{self.hinge}" comes within {self.measure:.0e} of the angle at which its '
+            f'hinge "{self.hinge}" comes within {self.measure:.0e} of the singularity of its '
+            f"coordinates, at about t = {self.time:.4g} s"
         )
-        approach += f"coordinates fail, at about t = {self.time:.4g} s"
         if self.measure < MIN_SINGULAR_MEASURE:
             return Risk(
                 "gimbal",
@@ -113,12 +114,12 @@ class SingularDistance:
                 self.measure,
                 MIN_SINGULAR_MEASURE,
             )
-        if self.measure < NEAR_SINGULAR_MEASURE and self.turned > MAX_STEP_ANGLE:
+        if self.measure < NEAR_SINGULAR_MEASURE and self.rotation_per_step > MAX_STEP_ANGLE:
             return Risk(
                 "gimbal", f'hinge "{self.hinge}"',
-                f"{approach}, and its angles change there by {self.turned:.2g} rad within a step",
-                "use a ball hinge, or a method that chooses its steps", self.turned, MAX_STEP_ANGLE,
-                "rad",
+                f"{approach}, where its angles change by {self.rotation_per_step:.2g} rad per step",
+                "use a ball hinge, or an adaptive method",
+                self.rotation_per_step, MAX_STEP_ANGLE, "rad",
             )  # fmt: skip
         return None
 
@@ -136,12 +137,12 @@ def pivot_loss(model: CompiledScene, run: Trajectory) -> PivotLoss | None:
         not len(run.t)
         or not model.nu
         or len(model.scene.bodies) > MAX_CHECKED_BODIES
-        or model.packed.qr
+        or model.packed_scene.qr
     ):
         return None
-    if model.packed.system.closes:
+    if model.packed_scene.system.has_loops:
         return None
-    refines = int(model.packed.model.refines)
+    refines = int(model.packed_scene.model.refines)
     worst, pivots = PivotLoss(0.0, "", 0.0, refines), _PivotRatios(model)
     count = int(np.clip(_MAX_BODY_SAMPLES // len(pivots.parents), 1, MAX_PIVOT_SAMPLES))
     for k in np.unique(np.linspace(0, len(run.t) - 1, count).astype(int)):
@@ -166,22 +167,22 @@ class _PivotRatios:
     """Offsets of inertias and motion subspaces of all n bodies in the workspace."""
 
     def __init__(self, model: CompiledScene) -> None:
-        packed, lib = model.packed, model.looped.lib
+        packed, lib = model.packed_scene, model.looped.lib
         system = packed.system
         self.parents = system.parents
         speeds = system.rows(lambda body: body.nu)[:, None]
         blocks = packed.written.blocks[:, None]
         self.inertia = blocks + lib.MSTMM_BLOCK_S + np.arange(21)
-        self.turn = blocks + lib.MSTMM_BLOCK_R + np.arange(9)
+        self.rotation_columns = blocks + lib.MSTMM_BLOCK_R + np.arange(9)
         self.shift = blocks + lib.MSTMM_BLOCK_SHIFT + np.arange(3)
         column = np.arange(6)
-        self.there = column < speeds  # (n, 6): existing columns of H
+        self.has_column = column < speeds  # (n, 6): existing columns of H
         first = blocks + lib.MSTMM_BLOCK_FIXED + lib.MSTMM_SPEED_H * speeds
         rows = first[:, :, None] + np.arange(6)[:, None] * speeds[:, :, None]
-        self.subspace = rows + np.where(self.there, column, 0)[:, None, :]
+        self.subspace = rows + np.where(self.has_column, column, 0)[:, None, :]
         self.release = system.rows(lambda body: body.release)
         self.rotor = system.rows(lambda body: _pad_to_six(body.rotor))
-        self.imposed = system.rows(lambda body: _pad_to_six(body.imposed)) != 0
+        self.is_prescribed = system.rows(lambda body: _pad_to_six(body.imposed)) != 0
         self.modal = ModalPivots(packed, lib)
 
     def ratios(self, numbers: Array, memory: Array) -> Array:
@@ -193,15 +194,15 @@ class _PivotRatios:
         S = np.zeros((len(self.parents), 6, 6))
         S[:, _UPPER_TRIANGLE[0], _UPPER_TRIANGLE[1]] = numbers[self.inertia]
         S = S + np.triu(S, 1).transpose(0, 2, 1)
-        free = self.there & ~(self.imposed & ~self._released(memory)[:, None])
+        free = self.has_column & ~(self.is_prescribed & ~self._is_released(memory)[:, None])
         H = np.where(free[:, None, :], numbers[self.subspace], 0.0)
         D = H.transpose(0, 2, 1) @ S @ H + (self.rotor * free + ~free)[:, :, None] * np.eye(6)
         inverse = np.linalg.inv(D)
         projection = np.eye(6) - H @ inverse @ H.transpose(0, 2, 1) @ S
-        rotation = numbers[self.turn].reshape(-1, 3, 3)
+        rotation = numbers[self.rotation_columns].reshape(-1, 3, 3)
         motion = _carried_motion(rotation, numbers[self.shift])
         E = np.abs(np.diagonal(S, axis1=1, axis2=2))[:, :, None] * np.eye(6)
-        self.modal.through(numbers, S, motion, self.parents, E)
+        self.modal.add_modal_response(numbers, S, motion, self.parents, E)
         transfer = projection @ motion
         for i in range(len(self.parents) - 1, -1, -1):
             parent = self.parents[i]
@@ -212,7 +213,7 @@ class _PivotRatios:
         ratios = np.where(free, rounding / np.maximum(np.abs(pivots), 1e-300), 0.0)
         return np.asarray(ratios.max(axis=1))
 
-    def _released(self, memory: Array) -> NDArray[np.bool_]:
+    def _is_released(self, memory: Array) -> NDArray[np.bool_]:
         padded_memory = np.append(memory, 0.0)
         return np.asarray(padded_memory[self.release] != 0.0) & (self.release >= 0)
 
@@ -241,7 +242,7 @@ def may_be_singular(model: CompiledScene) -> bool:
     """Whether any hinge has a coordinate singularity."""
     return any(
         _singularity_kernel(model, group.first + k) is not None
-        for group in model.layout.groups
+        for group in model.coordinate_layout.groups
         for k in range(min(group.count, len(group.hinges)))
     )
 
@@ -252,7 +253,7 @@ def singular_distance(model: CompiledScene, run: Trajectory) -> SingularDistance
     A change of sign between two samples counts as zero: the coordinates failed in between.
     """
     distances: list[SingularDistance] = []
-    for group in model.layout.groups:
+    for group in model.coordinate_layout.groups:
         for k in range(min(group.count, len(group.hinges))):
             kernel = _singularity_kernel(model, group.first + k)
             if kernel is None:
@@ -261,7 +262,7 @@ def singular_distance(model: CompiledScene, run: Trajectory) -> SingularDistance
                 measures = _singularity_measures(model, run, number, kernel)
                 if len(measures):
                     distances.append(_smallest_distance(model, run, number, measures))
-    return min(distances, key=lambda one: one.measure, default=None)
+    return min(distances, key=lambda candidate: candidate.measure, default=None)
 
 
 def _smallest_distance(
@@ -274,18 +275,18 @@ def _smallest_distance(
         k, value = int(changes[0]), 0.0
         part = measures[k] / (measures[k] - measures[k + 1])
         time = float(run.t[k] + part * (run.t[k + 1] - run.t[k]))
-    speeds = np.abs(run.u[:, model.layout.slots(number).u_slice])
+    speeds = np.abs(run.u[:, model.coordinate_layout.slots(number).u_slice])
     angle_per_step = (run.settings.step or 0.0) * float(np.nanmax(speeds, initial=0.0))
-    name = model.packed.scene.hinges.name(number)
+    name = model.packed_scene.scene.hinges.name(number)
     return SingularDistance(value, name, time, angle_per_step)
 
 
 def _singularity_kernel(model: CompiledScene, number: int) -> Any:
     """Kernel `singularity` of a hinge's type, None if it has none."""
-    packed = model.packed
+    packed = model.packed_scene
     if not packed.layout.slots(number).nq:
         return None
-    body = packed.system.body(packed.topology.place_of_hinge(number))
+    body = packed.system.body(packed.topology.position_of_hinge(number))
     kernel = packed.elements[body.hinge].functions.get("singularity")
     if kernel is None:
         return None
@@ -294,9 +295,9 @@ def _singularity_kernel(model: CompiledScene, number: int) -> Any:
 
 def _singularity_measures(model: CompiledScene, run: Trajectory, number: int, call: Any) -> Array:
     """Singularity measure of one hinge at every sample."""
-    packed = model.packed
+    packed = model.packed_scene
     ffi, slots = packed.ffi, packed.layout.slots(number)
-    p = packed.system.body(packed.topology.place_of_hinge(number)).hinge_p or (0.0,)
+    p = packed.system.body(packed.topology.position_of_hinge(number)).hinge_p or (0.0,)
     coordinates = np.ascontiguousarray(run.q[:, slots.q_slice])
     measures, pointer = np.full(len(coordinates), np.nan), ffi.new("double *")
     for k, row in enumerate(coordinates):

@@ -56,7 +56,7 @@ def energy_drift(result: Record) -> Drift:
     In static equilibrium no energy is exchanged: the scale is then a fraction of the stored energy,
     or the energy of gravity due to rounding of positions.
     """
-    parts, work = result.energies(), result.work
+    parts, work = result.energy_components(), result.work
     with np.errstate(all="ignore"):  # the residual shows an overflow
         residual = sum(parts.values(), -work)
         overflows = any(np.isinf(part).any() for part in (*parts.values(), work))
@@ -87,18 +87,18 @@ def momentum_drifts(result: Record) -> list[Drift]:
     and the larger of the largest angular momentum and that times the extent of the scene.
     """
     scene, drifts = result.model.scene, list[Drift]()
-    flexible = result.model.flexible
+    flexible = result.model.flexible_bodies
     has_drag = any(body.drag is not None for body in flexible.values())
     if not len(result.t) or has_drag or not _is_isolated(scene):
         return drifts
     bodies = scene.skeleton.bodies
     sampled_indices = range(0, len(bodies), max(1, len(bodies) // _MAX_SAMPLED_BODIES))
     names = [bodies.name(i) for i in sampled_indices]
-    result._observed.fetch(names)
+    result._observations.fetch(names)
     reach = max((_max_abs(result.position(name)) for name in names), default=0.0)
     pivot, pivot_label = _momentum_pivot(result, reach)
     reach = max((_max_abs(result.position(name) - pivot) for name in names), default=0.0)
-    kinetic = _max_abs(result.energies()["kinetic"])
+    kinetic = _max_abs(result.energy_components()["kinetic"])
     mass = total_mass(result.model)
     linear, angular = result.momentum(), result.angular_momentum()
     angular = angular - np.cross(pivot, linear)
@@ -110,16 +110,16 @@ def momentum_drifts(result: Record) -> list[Drift]:
         result, _ground_hinges(scene), pivot, is_conserved.ravel()
     ).reshape(2, 3)
     speed = np.sqrt(
-        2 * max(kinetic, _STORED_ENERGY_RATIO * _max_stored_energy(result.energies()))
+        2 * max(kinetic, _STORED_ENERGY_RATIO * _max_stored_energy(result.energy_components()))
     ) * np.sqrt(mass)
     scale = max(_max_abs(np.linalg.norm(angular, axis=1)), speed * reach)
     for k, axis in enumerate("xyz"):
         if is_conserved[0, k]:
             change = _max_change(linear[:, k])
-            drifts.append(Drift(f"momentum {axis}", "kg*m/s", change, speed, "that moves"))
+            drifts.append(Drift(f"momentum {axis}", "kg*m/s", change, speed, "in motion"))
         if is_conserved[1, k]:
             name, change = f"angular momentum {axis}{pivot_label}", _max_change(angular[:, k])
-            drifts.append(Drift(name, "kg*m2/s", change, scale, "that turns"))
+            drifts.append(Drift(name, "kg*m2/s", change, scale, "in rotation"))
     return drifts
 
 
@@ -209,7 +209,7 @@ def _unsupported_axes(
     if all(map(_carries_nothing, roots)):
         return [True] * 3, [True] * 3
     force, moment = np.zeros((len(result.t), 3)), np.zeros((len(result.t), 3))
-    largest = result._observed.largest_loads()
+    largest = result._observations.largest_loads()
     sizes = (
         max(largest[0], kinetic / reach if reach > 0 else 0.0),
         max(largest[1] + largest[0] * reach, kinetic),

@@ -38,10 +38,10 @@ class Measure(ABC):
         """Read the compared values (n, k) of a run at its samples."""
 
     @abstractmethod
-    def apart(self, a: Array, b: Array) -> Array:
+    def distance(self, a: Array, b: Array) -> Array:
         """Distances (n,) of two runs from their values (n, k)."""
 
-    def scale_by(self, numbers: Array) -> None:  # noqa: B027 - most measures need no reference
+    def set_scales(self, numbers: Array) -> None:  # noqa: B027 - most measures need no reference
         """Set the scales from the reference, where they depend on the run."""
 
 
@@ -55,22 +55,22 @@ class Coordinates(Measure):
     )
 
     def __init__(self, model: CompiledScene) -> None:
-        self._layout = model.layout
+        self._layout = model.coordinate_layout
         self._sizes: dict[str, float] = {}
 
     def read(self, result: Record) -> Array:
         return result.q
 
     @property
-    def least(self) -> float:
+    def min_scale(self) -> float:
         """Smallest scale of units other than rad, at most 1."""
         return min([1.0, *self._sizes.values()])
 
-    def scale_by(self, numbers: Array) -> None:
+    def set_scales(self, numbers: Array) -> None:
         excursion_by_unit = excursions(self._layout, numbers, but="rad")
         self._sizes = {unit: size or 1.0 for unit, size in excursion_by_unit.items()}
 
-    def apart(self, a: Array, b: Array) -> Array:
+    def distance(self, a: Array, b: Array) -> Array:
         distances = np.zeros(len(a))
         for unit, difference in differences(self._layout, a, b, "q"):
             distances = np.maximum(distances, difference / self._sizes.get(unit, 1.0))
@@ -86,11 +86,11 @@ class Quantities(Measure):
         self._widths = [
             1 if quantity.values.ndim == 1 else quantity.values.shape[1] for quantity in quantities
         ]
-        self._turns = [quantity.labels == tuple("wxyz") for quantity in quantities]
+        self._is_quaternion = [quantity.labels == tuple("wxyz") for quantity in quantities]
         self._sizes = [1.0] * len(quantities)
         self.name = ", ".join(self._names)
         if len(quantities) == 1:
-            self.unit = "rad" if self._turns[0] else quantities[0].unit or "1"
+            self.unit = "rad" if self._is_quaternion[0] else quantities[0].unit or "1"
             self.scaling = "none: the length of the difference" if self._widths[0] > 1 else "none"
         else:
             self.scaling = "each in parts of its largest excursion in the reference"
@@ -99,19 +99,21 @@ class Quantities(Measure):
         columns = [_quantity(result, name).values for name in self._names]
         return np.hstack([values.reshape(len(values), -1) for values in columns])
 
-    def scale_by(self, numbers: Array) -> None:
+    def set_scales(self, numbers: Array) -> None:
         if len(self._names) > 1:
             start = np.broadcast_to(numbers[:1], numbers.shape)
-            self._sizes = [float(distance.max()) or 1.0 for distance in self._ways(numbers, start)]
+            self._sizes = [
+                float(distance.max()) or 1.0 for distance in self._distances(numbers, start)
+            ]
 
-    def apart(self, a: Array, b: Array) -> Array:
-        distances = self._ways(a, b)
+    def distance(self, a: Array, b: Array) -> Array:
+        distances = self._distances(a, b)
         return np.max(
             [distance / scale for distance, scale in zip(distances, self._sizes, strict=True)],
             axis=0,
         )
 
-    def _ways(self, a: Array, b: Array) -> list[Array]:
+    def _distances(self, a: Array, b: Array) -> list[Array]:
         """Distances (n,), one array for each quantity."""
         split_indices = np.cumsum(self._widths)[:-1]
         pairs = zip(
@@ -119,7 +121,7 @@ class Quantities(Measure):
         )
         return [
             rotation_between(x, y) if is_rotation else np.linalg.norm(x - y, axis=1)
-            for (x, y), is_rotation in zip(pairs, self._turns, strict=True)
+            for (x, y), is_rotation in zip(pairs, self._is_quaternion, strict=True)
         ]
 
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 def result_of(model: CompiledScene, run: Trajectory, error: ErrorEstimate | None = None) -> Result:
     """Build the result of a run, with elastic responses where bodies are one-way."""
-    expanded = model.packed.expanded
+    expanded = model.packed_scene.expanded
     rigid = None if expanded is None else expanded.rigidified
     if rigid is None or not rigid.one_way:
         return Result(model, run, error)

@@ -27,20 +27,20 @@ _ZERO_RATIO = 1e-9
 
 
 def momentum_kept_by_impacts(
-    result: Record, roots: Sequence[Hinge], pivot: Array, asked: NDArray[np.bool_]
+    result: Record, roots: Sequence[Hinge], pivot: Array, is_requested: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """Mask (6,) of the components in `asked` that the impacts of a run conserve.
+    """Mask (6,) of the components in `is_requested` that the impacts of a run conserve.
 
     Linear momentum along each axis, then angular momentum about `pivot` (3,) in m; `roots` are the
     hinges on the ground.
     """
-    kept, impacts = asked.copy(), _impact_samples(result)
+    kept, impacts = is_requested.copy(), _impact_samples(result)
     if impacts is None:
-        return np.zeros_like(asked)
+        return np.zeros_like(is_requested)
     if impacts and kept.any():
         scene = _RigidScene(result, roots, pivot)
         for row, event in impacts:
-            kept &= scene.untouched(row, event, kept)
+            kept &= scene.rigid_motion_axes(row, event, kept)
             if not kept.any():
                 break
     return kept
@@ -54,7 +54,7 @@ def has_impacts(result: Record) -> bool:
 
 def _impact_samples(result: Record) -> list[tuple[int, int]] | None:
     """Pairs (sample, event) of all impacts; None if samples may not show all of them."""
-    bounce_events = {bounce.event for bounce in result.model.packed.watched.bounces}
+    bounce_events = {bounce.event for bounce in result.model.packed_scene.event_functions.bounces}
     rows = np.flatnonzero(result.event > 0).tolist()
     statistics = result.statistics
     if bounce_events and (statistics is None or len(rows) < statistics.events):
@@ -67,21 +67,23 @@ class _RigidScene:
 
     def __init__(self, result: Record, roots: Sequence[Hinge], pivot: Array) -> None:
         self._result, self._system = result, SceneSystem(result.model.looped)
-        self._speeds = [result.layout(hinge.name).u_slice for hinge in roots]
+        self._speeds = [result.coordinate_info(hinge.name).u_slice for hinge in roots]
         self._names = [hinge.outboard for hinge in roots]
         self._arms = [result.position(name) - pivot for name in self._names]
-        references = result._observed.references
+        references = result._observations.references
         self._kinematics = Kinematics(result.model.looped, NoFusedCode(), references, lambda: None)
 
-    def untouched(self, row: int, event: int, asked: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Mask of the `asked` axes (6,) along and about which the scene can move rigidly.
+    def rigid_motion_axes(
+        self, row: int, event: int, is_requested: NDArray[np.bool_]
+    ) -> NDArray[np.bool_]:
+        """Mask of the `is_requested` axes (6,) along and about which the scene can move rigidly.
 
         The motion must not change the distance to the object of the event.
         """
         speeds, allowed = self._rigid(row)
-        remaining = asked & allowed
+        remaining = is_requested & allowed
         try:
-            remaining[remaining] = self._stays(
+            remaining[remaining] = self._is_constant(
                 row, event, speeds[remaining], self._sizes(row)[remaining]
             )
         except NumericalFailure:
@@ -107,13 +109,13 @@ class _RigidScene:
         max_arm = max((float(np.linalg.norm(arms[row])) for arms in self._arms), default=0.0)
         return np.array([1.0, 1.0, 1.0, max_arm, max_arm, max_arm])
 
-    def _stays(self, row: int, event: int, motions: Array, sizes: Array) -> list[bool]:
+    def _is_constant(self, row: int, event: int, motions: Array, sizes: Array) -> list[bool]:
         """Whether an event's value is constant at one sample, for each of the speeds (n, nu)."""
         run, system = self._result.trajectory, self._system
         system.memory[:] = run.memory[row]
         t, y = float(run.t[row]), np.concatenate([run.q[row], run.u[row]])
-        rest_rate = system.meeting(event, t, y, np.zeros(motions.shape[1])).rate
-        approaches = [system.meeting(event, t, y, u) for u in motions]
+        rest_rate = system.approach_rate(event, t, y, np.zeros(motions.shape[1])).rate
+        approaches = [system.approach_rate(event, t, y, u) for u in motions]
         return [
             abs(approach.rate - rest_rate)
             <= _ZERO_RATIO * (approach.size + approach.steepness * scale)

@@ -70,13 +70,13 @@ class _SampledPath:
     Its values (n,) at the start, the samples and the end; between two of them the smallest and the
     largest, and the largest distance of a step, (n - 1,); its unit. `ranges` are the ranges of
     functions of time over the whole run, by term: such functions are known between neighbours of
-    `ends` only.
+    `positions` only.
     """
 
-    ends: Array
-    least: Array
-    most: Array
-    moved: Array
+    positions: Array
+    minima: Array
+    maxima: Array
+    step_distances: Array
     unit: str
     ranges: Mapping[int, float] = field(default_factory=dict)
 
@@ -116,25 +116,26 @@ def _rerun_with_all_steps(model: CompiledScene, run: Trajectory) -> Trajectory |
     if run.statistics.steps > _MAX_RERUN_STEPS:
         return None
     _, q, u = run.first
-    t_end = run.settings.t_end if run.last is None else run.last[0]
+    t_end = run.settings.t_end if run.last_state is None else run.last_state[0]
     settings = replace(run.settings, t_end=t_end, output_times=None)
     rerun = first_run(model, settings, q, u, RunMonitor(None, settings))
     return replace(rerun, start=(q, u)) if rerun.is_comparable else None
 
 
 def _risk(
-    what: str, name: str, path: _SampledPath, place: float, way: float, longest: float
+    what: str, name: str, path: _SampledPath, position: float, step_distance: float, longest: float
 ) -> Risk:
-    remedy = f"give max_step = {longest:.1g}, or less"
+    remedy = f"use max_step = {longest:.1g} or less"
     if not path.ranges:
         remedy = (
-            f"write it within where({name} > a, where({name} < b, ..., 0), 0) with a and b close "
-            "around it, where steps end, or give max_step"
+            f"write it as where({name} > a, where({name} < b, ..., 0), 0), with a and b close "
+            "around the feature, so that steps end there, or give max_step"
         )
     return Risk(
         "narrow-load", what,
-        f"{what} does something near {name} = {place:.6g}, narrower than {longest:.2g}, that steps "
-        f"of up to {way:.2g} there have passed over", remedy, way, longest, path.unit,
+        f"{what} has a feature near {name} = {position:.6g}, narrower than {longest:.2g}, that was "
+        f"missed by steps of up to {step_distance:.2g} there",
+        remedy, step_distance, longest, path.unit,
     )  # fmt: skip
 
 
@@ -160,7 +161,7 @@ def _coordinate_candidates(
                 path = _coordinate_path(model, run, fractions, name, hinge)
                 if path is not None:
                     yield (
-                        load.what,
+                        load.description,
                         ExpressionFunctions(load.expression, constants, names=(name.text,)),
                         path,
                     )
@@ -196,13 +197,17 @@ def _time_candidates(
                 view = ExpressionFunctions(
                     load.expression, constants, False, order, make_enclosures(t, piece, names)
                 )
-                yield load.what, view, _SampledPath(t, t[:-1], t[1:], step_lengths, "s", ranges)
+                yield (
+                    load.description,
+                    view,
+                    _SampledPath(t, t[:-1], t[1:], step_lengths, "s", ranges),
+                )
 
 
 def _peaked_terms(view: ExpressionFunctions) -> list[WatchedFunction]:
     """Terms that may have peaks; an angle only jumps, at half a turn."""
     terms = view.expression.terms
-    return [watched for watched in view.watched() if terms[watched.term].op != "atan2"]
+    return [watched for watched in view.narrow_candidates() if terms[watched.term].op != "atan2"]
 
 
 def _function_ranges(
@@ -235,7 +240,7 @@ def _enclosures_around(
 def _multi_variable_loads(
     model: CompiledScene,
 ) -> Iterator[tuple[ActiveExpression, Hinge | None, dict[str, float], list[str]]]:
-    """Active expressions of more than one coordinate that may have peaks.
+    """Loads and efforts that depend on several state variables and may have narrow peaks.
 
     Each with its hinge, constants and names.
     """
@@ -284,7 +289,7 @@ def _distinct_states(run: Trajectory) -> RunStates | None:
     """States of a run at distinct times, the last of each; None for fewer than two."""
     t, q, u = _all_states(run)
     memory = run.memory
-    if run.start is not None and run.last is not None and len(memory):
+    if run.start is not None and run.last_state is not None and len(memory):
         memory = np.concatenate([memory[:1], memory, memory[-1:]])
     if len(t) < 2 or len(memory) != len(t) or not (np.isfinite(q).all() and np.isfinite(u).all()):
         return None
@@ -304,8 +309,8 @@ def _max_step(run: Trajectory) -> float:
 def _all_states(run: Trajectory) -> tuple[Array, Array, Array]:
     """Times, coordinates and speeds (t, q, u) at the start, the samples and the end."""
     t, q, u = run.t, run.q, run.u
-    if run.start is not None and run.last is not None:
-        (end, *last), first = run.last, (run.settings.t_start, *run.start)
+    if run.start is not None and run.last_state is not None:
+        (end, *last), first = run.last_state, (run.settings.t_start, *run.start)
         rows = zip(first, (t, q, u), (end, *last), strict=True)
         t, q, u = (np.concatenate([np.asarray(a)[None], x, np.asarray(b)[None]])
                    for a, x, b in rows)  # fmt: skip
@@ -331,11 +336,11 @@ def _coordinate_path(
     hinge = name.hinge or ("" if own is None else own.name)
     if name.quantity != "q" or not hinge:
         return None
-    slots, index = model.layout.hinges[hinge], name.index or 0
+    slots, index = model.coordinate_layout.hinges[hinge], name.index or 0
     t, q, u = _all_states(run)
     ends = q[:, slots.q + index]
     values = np.stack([ends[:-1], ends[1:]])
-    if slots.straight:
+    if slots.rates_are_speeds:
         values = _cubic_values(np.diff(t), ends, u[:, slots.u + index])
     distance = np.abs(np.diff(values, axis=0)).sum(axis=0)
     return _SampledPath(
@@ -360,25 +365,26 @@ def _first_missed_peak(
     view: ExpressionFunctions, path: _SampledPath, ends_are_steps: bool
 ) -> tuple[float, float, float] | None:
     """First missed peak: (position, length of steps there, required length)."""
-    low, high = float(path.least.min()), float(path.most.max())
-    watched = _peaked_terms(view) if path.ranges else view.watched()
+    low, high = float(path.minima.min()), float(path.maxima.max())
+    watched = _peaked_terms(view) if path.ranges else view.narrow_candidates()
     if not high > low or not watched:
         return None
-    edges = path.ends if path.ranges else None
-    max_cells = _MAX_CELLS_PER_PIECE if path.ranges else view.most
+    edges = path.positions if path.ranges else None
+    max_cells = _MAX_CELLS_PER_PIECE if path.ranges else view.max_cells
     resolution = step_limits(view.terms, watched, low, high, max_cells, edges)
-    is_narrow = resolution.longest < path.moved.max(initial=0.0)
+    is_narrow = resolution.longest < path.step_distances.max(initial=0.0)
     if not is_narrow.any():
         return None
     root = view.expression.root
     for term in watched:
         positions, values, limits = _narrow_peaks(view, term, resolution, is_narrow, high)
-        ends = view.values(term.term, path.ends)
+        ends = view.values(term.term, path.positions)
         for position, value, limit in zip(positions, values, limits, strict=True):
             is_long = (
-                path.moved > (_TIME_STEP_FACTOR if path.ranges and ends_are_steps else 1.0) * limit
+                path.step_distances
+                > (_TIME_STEP_FACTOR if path.ranges and ends_are_steps else 1.0) * limit
             )
-            missed = (path.least <= position) & (position <= path.most) & is_long
+            missed = (path.minima <= position) & (position <= path.maxima) & is_long
             if ends_are_steps or path.ranges:
                 function_range = max(
                     np.ptp(np.append(values, ends)), path.ranges.get(term.term, 0.0)
@@ -387,13 +393,13 @@ def _first_missed_peak(
                     _hidden_height(value, ends, ends_are_steps) > _MIN_PEAK_RATIO * function_range
                 )
             if path.ranges and missed.any():  # a narrow part may not affect the whole
-                whole_values = view.values(root, np.append(path.ends, position))
+                whole_values = view.values(root, np.append(path.positions, position))
                 missed &= (
                     _hidden_height(whole_values[-1], whole_values[:-1], ends_are_steps)
                     > _MIN_PEAK_RATIO * path.ranges[root]
                 )
             if missed.any():
-                return position, float(path.moved[missed].max()), limit
+                return position, float(path.step_distances[missed].max()), limit
     return None
 
 
@@ -404,7 +410,11 @@ def _hidden_height(value: float, ends: Array, both: bool) -> Array:
 
 
 def _narrow_peaks(
-    view: ExpressionFunctions, one: WatchedFunction, known: StepLimits, narrow: Array, high: float
+    view: ExpressionFunctions,
+    watched: WatchedFunction,
+    known: StepLimits,
+    narrow: Array,
+    high: float,
 ) -> tuple[Array, Array, Array]:
     """Peaks of a function in its narrow parts: position, height, and step limit there."""
     ends = np.append(known.starts[1:], high)
@@ -418,7 +428,7 @@ def _narrow_peaks(
         np.concatenate(positions), return_index=True
     )  # shared edges of parts
     limit = np.concatenate(limits)[first_indices]
-    values = view.values(one.term, points)
+    values = view.values(watched.term, points)
     signs = np.sign(np.diff(values))
     moving = np.flatnonzero(np.abs(signs) > 0)  # equal neighbours may be a turning point, too
     peak_indices = moving[1:][np.diff(signs[moving]) != 0][:_MAX_PEAKS]

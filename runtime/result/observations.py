@@ -48,7 +48,7 @@ class Observations:
         """Motion (n, 24) of "body" or "body.end", see `Observation`."""
         require_word("body", reference, "the name of a body or an end, such as 'rod1.tip'")
         if reference not in self._points:
-            canonical_name = self.references.place(reference)
+            canonical_name = self.references.canonical_name(reference)
             self._observe("points", canonical_name)
             self._points[reference] = self._points[canonical_name]
         return self._points[reference]
@@ -59,7 +59,7 @@ class Observations:
         Bodies of the engine's scene are, for example, point masses of a beam, "blade/point 1".
         """
         if name not in self._points:
-            self._seen([name], ("points",))
+            self._observe_parts([name], ("points",))
         return self._points[name]
 
     def fetch(self, references: Sequence[str]) -> None:
@@ -67,7 +67,7 @@ class Observations:
         if len(self.references) > _MAX_JOINT_REFERENCES:
             missing = [name for name in references if name not in self._points]
             if missing and len(self.run.t) * 24 * len(missing) <= _MAX_BATCH_NUMBERS:
-                self._seen(missing, ("points",))
+                self._observe_parts(missing, ("points",))
 
     def part(self, name: str) -> Array:
         """Array of loads, efforts, udot, sums or rows, see `Observation`."""
@@ -83,15 +83,15 @@ class Observations:
         """Force (n, 3) (first 0) or moment (3) of a hinge."""
         observations, hinge_index = self, self.engine.packed.hinge_position.get(hinge)
         if hinge_index is None:  # the hinge welds bodies packed as one
-            observations = self.apart
+            observations = self.unmerged
             hinge_index = observations.engine.packed.hinge_position[hinge]
         return observations.columns("loads", (hinge_index, slice(first, first + 3)))
 
     @cached_property
-    def apart(self) -> Observations:
+    def unmerged(self) -> Observations:
         """Observations by the engine that packs every body separately."""
         result = Observations(self._model, self.run)
-        result.engine = self._model.apart
+        result.engine = self._model.unmerged_engine
         return result
 
     def largest_loads(self) -> tuple[float, float]:
@@ -129,11 +129,11 @@ class Observations:
             references = [] if reference is None else [reference]
         else:
             references = list(self.references)
-        self._seen(references, parts)
+        self._observe_parts(references, parts)
 
-    def _seen(self, wanted: Sequence[str], parts: Sequence[str]) -> None:
+    def _observe_parts(self, names: Sequence[str], parts: Sequence[str]) -> None:
         run = self.run
-        probes = [Probe(*self.engine.packed.end(r)) for r in wanted]
+        probes = [Probe(*self.engine.packed.end(r)) for r in names]
         observation = self.engine.observe(run.t, run.q, run.u, run.memory, probes, parts)
         if "efforts" in parts:
             _clear_modal_efforts(observation.efforts, self.engine.packed.layout)
@@ -143,7 +143,7 @@ class Observations:
         ):
             array.flags.writeable = False
         self.failures = self.failures or observation.failures
-        for i, name in enumerate(wanted):
+        for i, name in enumerate(names):
             self._points[name] = observation.points[:, i]
         self._parts |= {name: getattr(observation, name) for name in parts if name != "points"}
 

@@ -16,7 +16,7 @@ Values = Callable[[], Array]
 class Quantity:
     """Values (n,) or (n, k) over time; `labels` has one entry per column.
 
-    `rates` are their time derivatives if these are also quantities. `what` is the noun of an
+    `rates` are their time derivatives if these are also quantities. `description` is the noun of an
     `owner`: "angle" of "hinge elbow"; "" without an owner. `note` is a sentence for readers.
     """
 
@@ -26,7 +26,7 @@ class Quantity:
     long_name: str
     labels: tuple[str, ...] = ()
     rates: Callable[[], Array] | None = field(default=None, compare=False)
-    what: str = ""
+    description: str = ""
     owner: str = ""
     note: str = ""
 
@@ -40,12 +40,13 @@ def column_labels(quantity: Quantity) -> list[str]:
 class Table:
     """Names of one owner: getters, names of all scalar columns, and undivided vectors.
 
-    Files hold the `whole` quantities, with vectors undivided. Of equal names the first one counts.
+    Files hold the `vector_names` quantities, with vectors undivided. Of equal names the first one
+    counts.
     """
 
     entries: dict[str, Callable[[], Quantity]]
     scalars: list[str]
-    whole: list[str] = field(default_factory=list)
+    vector_names: list[str] = field(default_factory=list)
 
     def scalar(
         self, name: str, unit: str, what: str, get: Values, k: int | None = None,
@@ -54,8 +55,8 @@ class Table:
         """Add a scalar quantity: column k of the values that `get` returns."""
         long_name = f"{what} of {owner}" if owner else what
         if name not in self.entries and listed:
-            self.whole.append(name)
-        self._one(name, unit, long_name, get, k, rates, listed, what, owner)
+            self.vector_names.append(name)
+        self._add_entry(name, unit, long_name, get, k, rates, listed, what, owner)
 
     def vector(
         self, name: str, owner: str, about: QuantityKind, get: Values, rates: Values | None = None,
@@ -69,7 +70,7 @@ class Table:
         """
         what, long_name = about.long_name, f"{about.long_name} of {owner}"
 
-        def whole() -> Quantity:
+        def make_vector() -> Quantity:
             values = get()
             note_text = "" if note is None else note(values)
             return Quantity(
@@ -77,14 +78,14 @@ class Table:
             )
 
         if name not in self.entries and listed:
-            self.whole.append(name)
-        self.entries.setdefault(name, whole)
+            self.vector_names.append(name)
+        self.entries.setdefault(name, make_vector)
         for k, label in enumerate(about.labels):
             text = f"{long_name}, {label}"
             short_name = f"{base or owner}.{about.short[k]}" if about.short else ""
             has_free_short_name = bool(short_name) and short_name not in self.entries
             full_name = f"{name}.{label}"
-            self._one(
+            self._add_entry(
                 full_name,
                 about.unit,
                 text,
@@ -97,16 +98,18 @@ class Table:
                 note,
             )
             if has_free_short_name:
-                self._one(short_name, about.unit, text, get, k, rates, listed, what, owner, note)
+                self._add_entry(
+                    short_name, about.unit, text, get, k, rates, listed, what, owner, note
+                )
 
-    def _one(
+    def _add_entry(
         self, name: str, unit: str, long_name: str, get: Values, k: int | None,
         rates: Values | None, listed: bool, what: str, owner: str,
         note: Callable[[Array], str] | None = None,
     ) -> None:  # fmt: skip
         rate_values = None if rates is None else (lambda: _select_column(rates(), k))
 
-        def one() -> Quantity:
+        def make_component() -> Quantity:
             values = get()
             note_text = "" if note is None else note(values)
             return Quantity(
@@ -123,7 +126,7 @@ class Table:
 
         if name not in self.entries and listed:
             self.scalars.append(name)
-        self.entries.setdefault(name, one)
+        self.entries.setdefault(name, make_component)
 
 
 def _select_column(values: Array, k: int | None) -> Array:

@@ -6,10 +6,11 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from mstmm.argument_validation import require_path
 from mstmm.notebook_html import NotebookDisplay, table
+from mstmm.public_members import PublicMembers
 
 from .certificate import Certificate
 from .result_record import Record
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from .scene3d.view import SceneView
 
 
-class Result(Record, NotebookDisplay):
+class Result(PublicMembers, Record, NotebookDisplay):
     """Result of a run: states and derived quantities at the sample times.
 
     Arrays have the time as their first axis, SI units, radians; vectors are in inertial axes.
@@ -39,9 +40,27 @@ class Result(Record, NotebookDisplay):
         checkpoint: the file that stores the run until its result is saved; None without one.
     """
 
+    member_groups: ClassVar[Mapping[str, str]] = {
+        "Run": "model settings success status message statistics method_history "
+        "achieved_error last_state checkpoint",
+        "Samples": "t q u udot event coordinates speeds coordinate_info",
+        "Motion": "position velocity acceleration orientation angular_velocity "
+        "angular_acceleration center_of_mass",
+        "Loads": "force moment effort",
+        "Energy and momentum": "energy energy_components work power momentum angular_momentum "
+        "body_momentum body_angular_momentum",
+        "Flexible bodies": "deflection slope curvature deflected_shape bending_moment axial_force "
+        "section_force section_moment strain_energy modal_energy "
+        "equivalent_velocity equivalent_angular_velocity",
+        "Quantities by name": "quantity quantity_names default_quantities "
+        "picture_names outputs table",
+        "Verdict": "trusted certificate risks warnings",
+        "Output": "plot view report save to_xarray meshes",
+    }
+
     @property
     def trusted(self) -> bool:
-        """True if there is no objection to the result.
+        """True if the quality of the result was checked and no check objects.
 
         A success whose balances and estimated error (certify=True) are within bounds and whose
         models stayed within their range. `certificate.verdict(accuracy, balance)` accepts other
@@ -56,7 +75,7 @@ class Result(Record, NotebookDisplay):
 
         return build_certificate(self, self._error)
 
-    def pictures(self) -> tuple[str, ...]:
+    def picture_names(self) -> tuple[str, ...]:
         """Names of the shape panels that `plot` accepts.
 
         "shape" (all flexible bodies), "blade.shape", "blade.deflection" (along the beam),
@@ -66,7 +85,7 @@ class Result(Record, NotebookDisplay):
 
         return tuple(panel_names(self))
 
-    def candidates(self) -> list[Candidate]:
+    def default_quantities(self) -> list[Candidate]:
         """Default quantities of `plot` and `table`."""
         from .plotting.default_quantities import default_candidates
 
@@ -113,8 +132,8 @@ class Result(Record, NotebookDisplay):
     ) -> Any:
         """`matplotlib` figure of quantities by name, one panel per unit (extra: plot).
 
-        Names of `pictures` draw flexible bodies. Without names: the shapes of flexible bodies, and
-        of the outputs of the scene, or else of coordinates, Euler angles and deflections, those
+        Names of `picture_names` draw flexible bodies. Without names: the shapes of flexible bodies,
+        and of the outputs of the scene, or else of coordinates, Euler angles and deflections, those
         that move most; the legend notes what was left out. With `path`, also written there (.png,
         .svg, .pdf).
 
@@ -178,7 +197,7 @@ class Result(Record, NotebookDisplay):
     def _repr_html_(self) -> str:
         certificate = self.certificate
         samples = f"{len(self.t)}, t = {self.t[0]:g} to {self.t[-1]:g} s" if len(self.t) else "none"
-        rows = [("samples", samples), ("method", self.settings.method), *certificate.rows()]
+        rows = [("samples", samples), ("method", self.settings.method), *certificate.as_pairs()]
         return table(rows)
 
     def __repr__(self) -> str:

@@ -59,8 +59,8 @@ class Record(FlexibleResults, ABC):
         self.t, self.q, self.u, self.event = run.t, run.q, run.u, run.event
         self.status = run.status
         self.statistics, self.settings = run.statistics, run.settings
-        self._observed = Observations(model, run)
-        self._quantities = Quantities(self._observed, self)
+        self._observations = Observations(model, run)
+        self._quantities = Quantities(self._observations, self)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the model, the run and meshes; derived quantities are computed again."""
@@ -94,7 +94,7 @@ class Record(FlexibleResults, ABC):
         if not unusable or not self.trajectory.is_comparable:
             return text
         text = f"{text}, but {unusable}"
-        return text if self._step is None else self._step.blamed(text)
+        return text if self._step is None else self._step.explain_failure(text)
 
     @cached_property
     def _step(self) -> StepCheck | None:
@@ -109,20 +109,20 @@ class Record(FlexibleResults, ABC):
         """Reason why samples with finite states cannot be used, or ""."""
         run = self.trajectory
         if (
-            not self.model.flexible
+            not self.model.flexible_bodies
             and max(_max_abs(run.q), _max_abs(run.u), _max_abs(run.work)) < _MAX_SAFE_MAGNITUDE
         ):
             return ""
-        sums = self._observed.part("sums")
+        sums = self._observations.part("sums")
         failing = np.isnan(sums).any(axis=1)
-        if self._observed.failures and failing.any():
+        if self._observations.failures and failing.any():
             count = f"{failing.sum()} of {len(sums)} samples cannot be evaluated"
-            return f"{count}: {self._observed.failures[0]}"
+            return f"{count}: {self._observations.failures[0]}"
         finite = np.isfinite(sums).all() and np.isfinite(run.work).all()
-        return "" if finite else "its energies or momenta are beyond what numbers hold"
+        return "" if finite else "its energies or momenta overflow"
 
     @property
-    def methods(self) -> tuple[MethodSegment, ...]:
+    def method_history(self) -> tuple[MethodSegment, ...]:
         """Segments of method="auto": method, start (s), reason and fastest motion (1/s).
 
         Empty for a run with a given method.
@@ -130,14 +130,14 @@ class Record(FlexibleResults, ABC):
         return self.trajectory.methods
 
     @property
-    def error_estimate(self) -> AchievedError | None:
+    def achieved_error(self) -> AchievedError | None:
         """Achieved error for the target `simulate(error=...)`; None without a target."""
-        return self.trajectory.reached
+        return self.trajectory.achieved_error
 
     @property
     def last_state(self) -> tuple[float, Array, Array]:
         """Last valid state (t, q, u): the end, or the last one before a failure."""
-        state = self.trajectory.last
+        state = self.trajectory.last_state
         return (float(self.t[-1]), self.q[-1], self.u[-1]) if state is None else state
 
     @property
@@ -164,11 +164,11 @@ class Record(FlexibleResults, ABC):
 
         Findings are left out if the run was to ignore them.
         """
-        risks = self.risks if self.trajectory.told else ()
-        notes, failures = self.trajectory.notes, self._observed.failures
+        risks = self.risks if self.trajectory.reported_risks else ()
+        notes, failures = self.trajectory.notes, self._observations.failures
         return tuple(dict.fromkeys((*map(str, risks), *notes, *failures)))
 
-    def _outside(self) -> tuple[Risk, ...]:
+    def _model_risks(self) -> tuple[Risk, ...]:
         """Findings about models of the scene that are outside their range in any run."""
         return tuple(short_beam_warnings(self.model.scene))
 
@@ -179,61 +179,61 @@ class Record(FlexibleResults, ABC):
 
         Here and below: SceneError, with the nearest name, for an unknown name.
         """
-        return self._quantities.of_body(reference, "position")
+        return self._quantities.body_quantity(reference, "position")
 
     def velocity(self, reference: str) -> Array:
         """Velocity (n, 3) in m/s."""
-        return self._quantities.of_body(reference, "velocity")
+        return self._quantities.body_quantity(reference, "velocity")
 
     def acceleration(self, reference: str) -> Array:
         """Acceleration (n, 3) in m/s2, gravity not subtracted."""
-        return self._quantities.of_body(reference, "acceleration")
+        return self._quantities.body_quantity(reference, "acceleration")
 
     def orientation(self, reference: str) -> Array:
         """Unit quaternion (n, 4), w, x, y, z, of the user's axes to inertial axes.
 
         Its sign is continuous over time and w >= 0 in the first sample.
         """
-        return self._quantities.of_body(reference, "orientation")
+        return self._quantities.body_quantity(reference, "orientation")
 
     def angular_velocity(self, reference: str) -> Array:
         """Angular velocity (n, 3) in rad/s."""
-        return self._quantities.of_body(reference, "angular_velocity")
+        return self._quantities.body_quantity(reference, "angular_velocity")
 
     def angular_acceleration(self, reference: str) -> Array:
         """Angular acceleration (n, 3) in rad/s2."""
-        return self._quantities.of_body(reference, "angular_acceleration")
+        return self._quantities.body_quantity(reference, "angular_acceleration")
 
     # --- hinges ---------------------------------------------------------------------------------
 
-    def coordinate(self, hinge: str) -> Array:
+    def coordinates(self, hinge: str) -> Array:
         """Coordinates (n, nq) of one hinge; of a flexible body the modal coordinates."""
         return self.q[:, self._quantities.slots(hinge).q_slice]
 
-    def speed(self, hinge: str) -> Array:
+    def speeds(self, hinge: str) -> Array:
         """Speeds (n, nu) of one hinge; of a flexible body the modal speeds."""
         return self.u[:, self._quantities.slots(hinge).u_slice]
 
     def force(self, hinge: str) -> Array:
         """Force (n, 3) in N of the inboard on the outboard side of a hinge, inertial axes."""
-        return self._quantities.of_hinge(hinge, "force")
+        return self._quantities.hinge_quantity(hinge, "force")
 
     def moment(self, hinge: str) -> Array:
         """Moment (n, 3) in N*m of the inboard on the outboard side about P, inertial axes."""
-        return self._quantities.of_hinge(hinge, "moment")
+        return self._quantities.hinge_quantity(hinge, "moment")
 
     def effort(self, hinge: str) -> Array:
         """Efforts (n, nu) in N, N*m along the speeds of a hinge, of its law or its drive."""
         return self._quantities.effort(hinge)
 
-    def layout(self, hinge: str) -> HingeSlots:
+    def coordinate_info(self, hinge: str) -> HingeSlots:
         """Names, units and slots of a hinge's coordinates and speeds."""
         return self._quantities.slots(hinge)
 
     @property
     def udot(self) -> Array:
         """Accelerations (n, nu) of the hinge speeds, m/s2, rad/s2."""
-        return self._observed.part("udot")
+        return self._observations.part("udot")
 
     # --- sums -----------------------------------------------------------------------------------
 
@@ -241,7 +241,7 @@ class Record(FlexibleResults, ABC):
         """Total energy (n,) in J: kinetic, gravity (zero at the inertial origin), springs."""
         return self._quantities.sum("energy")
 
-    def energies(self) -> dict[str, Array]:
+    def energy_components(self) -> dict[str, Array]:
         """Parts of the energy, (n,) each in J: kinetic, gravity, springs."""
         names = ("kinetic", "gravity", "springs")
         return {name: self._quantities.sum(f"energy.{name}") for name in names}
@@ -269,7 +269,7 @@ class Record(FlexibleResults, ABC):
 
     # --- by name --------------------------------------------------------------------------------
 
-    def names(self) -> tuple[str, ...]:
+    def quantity_names(self) -> tuple[str, ...]:
         """All names that `quantity`, `plot` and `table` accept."""
         return tuple(self._quantities.names())
 

@@ -23,8 +23,8 @@ def finiteness_risks(finite: bool, reached: AchievedError | None) -> Iterator[Ri
     """Findings: states that are not finite, and a target error that was not achieved."""
     if not finite:
         yield Risk(
-            "not-finite", RUN, "the states hold numbers that are not finite",
-            "use smaller steps or tolerances, or find what goes to infinity",
+            "not-finite", RUN, "some states are not finite",
+            "use smaller steps or tolerances, or find the quantity that grows without bound",
         )  # fmt: skip
     if reached is not None and reached.risk is not None:
         yield reached.risk
@@ -45,7 +45,7 @@ def output_risks(run: Trajectory, outputs: Mapping[str, Array]) -> Iterator[Risk
                 f'output "{name}" is not finite at {int(is_invalid.sum())} of {len(run.t)} '
                 f"samples, "
                 f"first at t = {first_time:.6g} s",
-                "keep what it divides by and takes roots and logarithms of within their range",
+                "keep divisors and the arguments of roots and logarithms within their range",
             )
 
 
@@ -55,18 +55,18 @@ def balance_risks(
     """Findings: energy and momentum that are unknown, or drift more than steps explain."""
     has_misfit = closure is not None and closure.misfit > 0
     for drift in drifts:
-        if not drift.known:
+        if not drift.is_known:
             yield Risk(
                 _drift_risk_name(drift), drift.name,
-                f"{drift.name} cannot be balanced: it is beyond what numbers hold, or no sample "
-                "gives it", "use smaller steps or tolerances, or find what goes to infinity",
+                f"the drift of {drift.name} is unknown: overflow, or no sample can be evaluated",
+                "use smaller steps or tolerances, or find the quantity that grows without bound",
             )  # fmt: skip
     for drift in drifts:
         if drift.relative > control.bound:
             yield Risk(
                 _drift_risk_name(drift),
                 drift.name,
-                f"{drift.name} is not kept: it changes by {drift}",
+                f"{drift.name} is not conserved: it drifts by {drift}",
                 MISFIT_REMEDY if has_misfit else control.finer(drift.relative),
                 drift.relative,
                 control.bound,
@@ -91,9 +91,9 @@ def quaternion_risks(residual: float) -> Iterator[Risk]:
     if residual > MAX_LENGTH_ERROR:
         yield Risk(
             "quaternion-length", RUN,
-            f"quaternions were {residual:.1e} off their length 1 between the steps: attitudes err "
-            "by about as much", "take smaller tolerances, or a method of the package", residual,
-            MAX_LENGTH_ERROR,
+            f"the length of quaternions differed from 1 by up to {residual:.1e} between steps: the "
+            "error of attitudes is of the same size",
+            "use smaller tolerances, or a method of the package", residual, MAX_LENGTH_ERROR,
         )  # fmt: skip
 
 

@@ -33,7 +33,7 @@ def quantity_of(output: Output, t: Array, known: QuantityLookup) -> Quantity:
     names = np.stack(columns, axis=1)
     values = numpy_kernels.evaluate(expression_kernel(output.of), {"names": names})["value"][:, 0]
     return Quantity(
-        output.name, values, output.unit, _long_name(output), what=f"output {output.name}"
+        output.name, values, output.unit, _long_name(output), description=f"output {output.name}"
     )
 
 
@@ -57,7 +57,7 @@ def _with_output_name(output: Output, of: Quantity) -> Quantity:
     long_name = f"{_long_name(output)}, {of.long_name}"
     return replace(
         of, name=output.name, unit=output.unit or of.unit, long_name=long_name,
-        what=f"output {output.name}", owner="",
+        description=f"output {output.name}", owner="",
     )  # fmt: skip
 
 
@@ -72,7 +72,7 @@ def _name_values(name: Name, t: Array, known: QuantityLookup) -> Array:
     quantity = known(name.text)
     if quantity.values.ndim > 1:
         raise SceneError(
-            f'"{name.text}" has {quantity.values.shape[1]} components; take one of them, such as '
+            f'"{name.text}" has {quantity.values.shape[1]} components; use one of them, such as '
             f"{name.text}.{quantity.labels[0]}"
         )
     return quantity.values

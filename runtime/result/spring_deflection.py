@@ -58,7 +58,7 @@ def stiffest_spring_deflection(result: Record) -> SpringDeflection | None:
     for mount in mounts:
         entries = [mount.law.entry(k) for k in range(3)]
         if any(entry.stiffness > 0 for entry in entries):
-            offsets = result.coordinate(mount.name)[:, :3] - [entry.rest for entry in entries]
+            offsets = result.coordinates(mount.name)[:, :3] - [entry.rest for entry in entries]
             stiffness = max(entry.stiffness for entry in entries)
             sprung_offsets = offsets[:, [entry.stiffness > 0 for entry in entries]]
             deflections.append(

@@ -43,21 +43,21 @@ class StepControl:
         step: s; None for adaptive steps.
         rtol, atol: its tolerances.
         order: of the method.
-        asked: target error of the whole run, relative or in rad; 0 if in other units, None without
-            a target.
+        target_error: target error of the whole run, relative or in rad; 0 if in other units, None
+            without a target.
     """
 
     step: float | None
     rtol: float
     atol: float
     order: int
-    asked: float | None = None
+    target_error: float | None = None
 
     @property
     def bound(self) -> float:
         """Largest relative drift of energy and momentum that counts as conserved."""
-        if self.asked is not None:
-            return max(DEFAULT_DRIFT, self.asked)
+        if self.target_error is not None:
+            return max(DEFAULT_DRIFT, self.target_error)
         return MAX_DRIFT if self.step is not None else _drift_bound(max(self.rtol, self.atol))
 
     def finer(self, drift: float) -> str:
@@ -65,16 +65,18 @@ class StepControl:
         if self.step is not None:
             order = min(_ORDER_REDUCTION * self.order, _MAX_DRIFT_ORDER)
             shorter = self.step * (_SAFETY_FACTOR * self.bound / drift) ** (1 / order)
-            return f"take a step below {shorter:.2g} s, or a method that chooses its steps"
+            return f"use a step below {shorter:.2g} s, or an adaptive method"
         drift_ratio = drift / max(self.rtol, self.atol)
-        is_expected = drift_ratio <= _SAFETY_FACTOR * _DRIFT_PER_TOLERANCE and self.asked is None
+        is_expected = (
+            drift_ratio <= _SAFETY_FACTOR * _DRIFT_PER_TOLERANCE and self.target_error is None
+        )
         reduction = _SAFETY_FACTOR * (MAX_DRIFT if is_expected else DEFAULT_DRIFT) / drift
-        if self.asked:
-            return f"ask for an error below {reduction * self.asked:.1g}"
+        if self.target_error:
+            return f"request an error below {reduction * self.target_error:.1g}"
         if reduction * self.rtol < _MIN_TOLERANCE:
-            return "look for efforts, loads or drives that jump or go to infinity"
+            return "check efforts, loads and drives for jumps and for unbounded values"
         return (
-            f"take rtol = {reduction * self.rtol:.1g} and atol = {reduction * self.atol:.1g}, "
+            f"use rtol = {reduction * self.rtol:.1g} and atol = {reduction * self.atol:.1g}, "
             f"or less"
         )
 
@@ -89,5 +91,5 @@ def step_control(settings: Settings, reached: AchievedError | None) -> StepContr
     order = get(settings.method).order if has_tableau else _DEFAULT_ORDER
     target_error = None
     if reached is not None:
-        target_error = reached.asked if reached.unit in ("1", "rad") else 0.0
+        target_error = reached.target if reached.unit in ("1", "rad") else 0.0
     return StepControl(settings.step, settings.rtol, settings.atol, order, target_error)

@@ -19,28 +19,28 @@ class Verdict:
     """Verdict on a result within given bounds.
 
     Attributes:
-        against: objections, one sentence each.
-        missing: what was not checked.
+        objections: objections, one sentence each.
+        unchecked: what was not checked.
         bounds: the requested bounds, in words.
     """
 
-    against: tuple[str, ...]
-    missing: tuple[str, ...]
+    objections: tuple[str, ...]
+    unchecked: tuple[str, ...]
     bounds: str
 
     @property
     def trusted(self) -> bool:
         """Whether everything was checked and there is no objection."""
-        return not self.against and not self.missing
+        return not self.objections and not self.unchecked
 
     def __str__(self) -> str:
-        if self.against:
-            other_count = len(self.against) - 1
-            others = f" (and {other_count} more, see below)" if other_count else ""
-            return f"NOT trusted: {_first_clause(self.against[0])}{others}"
-        if self.missing:
-            return f"not judged: {'; '.join(self.missing)}; nothing seen speaks against it"
-        return f"trusted: {self.bounds}, and no model left its range"
+        if self.objections:
+            other_count = len(self.objections) - 1
+            remainder = f" (and {other_count} more, see below)" if other_count else ""
+            return f"NOT trusted: {_first_clause(self.objections[0])}{remainder}"
+        if self.unchecked:
+            return f"not verified: {'; '.join(self.unchecked)}; no check objects"
+        return f"trusted: {self.bounds}, all models within their validity range"
 
 
 def _first_clause(sentence: str) -> str:

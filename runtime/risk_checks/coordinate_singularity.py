@@ -29,4 +29,4 @@ def coordinate_singularity_risks(
     states = driven_states(model, settings, q, u, drive_times(model, settings))
     distance = singular_distance(model, states)
     if distance is not None and distance.risk is not None:
-        yield replace(distance.risk, before=True)
+        yield replace(distance.risk, seen_before_run=True)

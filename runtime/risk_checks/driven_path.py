@@ -24,7 +24,7 @@ _NO_STATISTICS = Statistics(0, 0, 0, 0, None, None, None, None, 0.0, 0.0, False,
 
 def drive_times(model: CompiledScene, settings: Settings) -> list[float]:
     """Times (s) of a run at which drives are evaluated; the start only without drives."""
-    moves = model.packed.system.driven and settings.t_end > settings.t_start
+    moves = model.packed_scene.system.driven and settings.t_end > settings.t_start
     return np.linspace(settings.t_start, settings.t_end, _DRIVE_TIMES if moves else 1).tolist()
 
 

@@ -24,7 +24,7 @@ _MAX_RATIO = 1.5
 
 def applies_to(model: CompiledScene) -> bool:
     """Whether there are flexible bodies."""
-    return bool(model.flexible)
+    return bool(model.flexible_bodies)
 
 
 def excitation_bandwidth_risks(
@@ -35,9 +35,9 @@ def excitation_bandwidth_risks(
     This is information only: the load may be small, or act on another body.  The result of the run
     estimates the truncation error of the shapes.
     """
-    time_map = model.packed.time_map(settings.t_start, settings.t_end)
+    time_map = model.packed_scene.time_map(settings.t_start, settings.t_end)
     shortest = float(time_map.longest.min(initial=np.inf))
-    for name, body in model.flexible.items() if np.isfinite(shortest) else ():
+    for name, body in model.flexible_bodies.items() if np.isfinite(shortest) else ():
         last = _last_bending_frequency(body)
         ratio = MAX_STEP_ANGLE / shortest / last if last > 0 else 0.0
         if ratio > _MAX_RATIO:
@@ -45,7 +45,7 @@ def excitation_bandwidth_risks(
                 "shapes", f'"{name}"',
                 f"{time_map.narrowest} changes at up to {MAX_STEP_ANGLE / shortest:.3g} rad/s, "
                 f'faster than the last shape of "{name}" ({last:.3g} rad/s) can respond',
-                "use more modes", ratio, _MAX_RATIO, doubt=False, before=True,
+                "use more modes", ratio, _MAX_RATIO, invalidates=False, seen_before_run=True,
             )  # fmt: skip
 
 

@@ -39,12 +39,12 @@ class ImplicitCost:
 
     method: str
     steps: float
-    each: float
+    evaluations_per_step: float
 
     @property
     def evaluations(self) -> float:
         """Total cost in evaluations."""
-        return self.steps * self.each
+        return self.steps * self.evaluations_per_step
 
 
 def implicit_cost(

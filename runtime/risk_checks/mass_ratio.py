@@ -28,7 +28,11 @@ _MAX_BODIES = 2000
 
 def applies_to(model: CompiledScene) -> bool:
     """Whether mass ratios are so large that digits may be lost."""
-    if model.packed.qr or model.packed.system.closes or len(model.scene.bodies) > _MAX_BODIES:
+    if (
+        model.packed_scene.qr
+        or model.packed_scene.system.has_loops
+        or len(model.scene.bodies) > _MAX_BODIES
+    ):
         return False
     return _MAX_LOSS_PER_RATIO * _max_mass_ratio(model.scene) >= MAX_PIVOT_LOSS
 
@@ -39,7 +43,7 @@ def mass_ratio_risks(
     """Risk of the largest loss of digits in the sweep at the start."""
     loss = pivot_loss(model, driven_states(model, settings, q, u, [settings.t_start]))
     if loss is not None and loss.risk is not None:
-        yield replace(loss.risk, before=True)
+        yield replace(loss.risk, seen_before_run=True)
 
 
 def accurate_sweep(model: CompiledScene) -> str:
@@ -49,7 +53,7 @@ def accurate_sweep(model: CompiledScene) -> str:
     """
     if not applies_to(model):
         return "riccati"
-    packed, settings = model.packed, Settings(0.0)
+    packed, settings = model.packed_scene, Settings(0.0)
     q, u = start_values(packed.scene, packed.layout, packed.flexible)
     loss = pivot_loss(model, driven_states(model, settings, q, u, [settings.t_start]))
     return "riccati" if loss is None or loss.risk is None else loss.sweep

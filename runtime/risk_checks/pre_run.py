@@ -14,8 +14,8 @@ from ..run.run_notes import unmapped_expression_notes
 from . import (
     coordinate_singularity,
     excitation_bandwidth,
-    loop_misfit,
     mass_ratio,
+    redundancy_gap,
     singular_start,
     spin_stiffening,
     stiffness,
@@ -37,7 +37,7 @@ _CHECKS: tuple[tuple[Callable[[CompiledScene], bool], Check], ...] = (
     (excitation_bandwidth.applies_to, excitation_bandwidth.excitation_bandwidth_risks),
     (stiffness.applies_to, stiffness.explicit_step_count_risks),
     (singular_start.applies_to, singular_start.singular_start_risks),
-    (loop_misfit.applies_to, loop_misfit.loop_misfit_risks),
+    (redundancy_gap.applies_to, redundancy_gap.redundancy_gap_risks),
 )
 
 #: Checks that apply to a model, found before its first run.
@@ -50,19 +50,19 @@ class PreRunFindings:
 
     Attributes:
         risks: without that of a fixed step, which the result adds.
-        told: whether the user is warned of them.
+        risks_reported: whether the user is warned of them.
     """
 
     model: CompiledScene
     risks: Iterable[Risk]
-    told: bool = True
+    risks_reported: bool = True
 
-    def given(self, run: Trajectory, q: Array, u: Array) -> Trajectory:
+    def attach_to(self, run: Trajectory, q: Array, u: Array) -> Trajectory:
         """Attach these findings, and those of its steps, to the run from q (nq,), u (nu,)."""
         risks = DeferredRisks(
             lambda: (*self.risks, *run.risks, *stiffness.stability_limited_risks(self.model, run))
         )
-        return replace(run, start=(q, u), risks=risks, told=self.told)
+        return replace(run, start=(q, u), risks=risks, reported_risks=self.risks_reported)
 
 
 def check_before_run(
@@ -74,7 +74,10 @@ def check_before_run(
     """
     if model not in _applicable_checks:
         _applicable_checks[model] = tuple(check for applies, check in _CHECKS if applies(model))
-    checks, notes = _applicable_checks[model], unmapped_expression_notes(model.packed, settings)
+    checks, notes = (
+        _applicable_checks[model],
+        unmapped_expression_notes(model.packed_scene, settings),
+    )
     risks = DeferredRisks(
         lambda: (*notes, *(risk for check in checks for risk in check(model, settings, q, u)))
     )

@@ -36,7 +36,7 @@ def check_start(
         step = check_step(model.looped, settings, q, u)
         step_risks = () if step is None or step.risk is None else (step.risk,)
         _reject_objections((*model.scene.risks, *step_risks, *findings.risks), "before the run")
-    return findings if on_risk != "ignore" else replace(findings, told=False)
+    return findings if on_risk != "ignore" else replace(findings, risks_reported=False)
 
 
 def apply_policy(result: Result, on_risk: str) -> Result:
@@ -59,7 +59,7 @@ def apply_policy(result: Result, on_risk: str) -> Result:
 
 def _reject_objections(risks: Iterable[Risk], where: str, result: Result | None = None) -> None:
     """Raise RiskRefused if one of the risks is an objection."""
-    objections = [risk for risk in risks if risk.doubt]
+    objections = [risk for risk in risks if risk.invalidates]
     if objections:
         rows = "\n".join(f"  {risk.name}: {risk}" for risk in objections)
         raise RiskRefused(

@@ -40,7 +40,7 @@ def _compute_limits(model: CompiledScene) -> Iterator[tuple[str, float]]:
     beams = {beam.name: beam for beam in model.scene.beam}
     environment = BeamEnvironment(model.scene) if beams else None
     limits_by_beam = dict[str, float]()  # equal beams share one computation
-    for name, body in model.flexible.items():
+    for name, body in model.flexible_bodies.items():
         limit = body.resolved
         if body.shapes is not None and name in beams and environment is not None:
             beam, data = beams[name], body.shapes.data
@@ -70,9 +70,10 @@ def response_range_risks(
         yield Risk(
             "frequency-range", f'"{name}"',
             f"the response is requested up to {_hertz(highest):.5g} Hz, but the shapes of "
-            f'"{name}" are valid up to {_hertz(limit):.5g} Hz{_others(len(exceeded) - 1)}',
-            f"{_REMEDY}, or exact = True for uniform beams",
-            _hertz(highest), _hertz(limit), "Hz",
+            f'"{name}" are valid up to {_hertz(limit):.5g} Hz'
+            f"{_other_bodies_text(len(exceeded) - 1)}",
+            f"{_REMEDY}, or exact = True for uniform beams", _hertz(highest), _hertz(limit),
+            "Hz",
         )  # fmt: skip
 
 
@@ -95,7 +96,8 @@ def motion_range_risks(
         yield Risk(
             "frequency-range", f'"{name}"',
             f"{modes} from {_hertz(frequencies.min()):.5g} Hz on cannot be trusted: the shapes of "
-            f'"{name}" are valid up to {_hertz(limit):.5g} Hz{_others(len(exceeded) - 1)}',
+            f'"{name}" are valid up to {_hertz(limit):.5g} Hz'
+            f"{_other_bodies_text(len(exceeded) - 1)}",
             f"{_REMEDY}, or compute the lowest modes only, modes(count)",
             _hertz(frequencies.max()), _hertz(limit), "Hz",
         )  # fmt: skip
@@ -105,5 +107,5 @@ def _hertz(omega: float) -> float:
     return float(omega) / (2 * np.pi)
 
 
-def _others(count: int) -> str:
+def _other_bodies_text(count: int) -> str:
     return f" (as for {count} more bodies)" if count else ""

@@ -32,7 +32,9 @@ def has_linear_bodies(model: CompiledScene) -> bool:
 
 
 def _linear_bodies(model: CompiledScene) -> list[str]:
-    return [name for name, body in model.flexible.items() if not has_second_order_terms(body)]
+    return [
+        name for name, body in model.flexible_bodies.items() if not has_second_order_terms(body)
+    ]
 
 
 def spin_stiffening_risks(
@@ -42,7 +44,7 @@ def spin_stiffening_risks(
     states = driven_states(model, settings, q, u, drive_times(model, settings))
     bodies = FlexibleBodies(model, Observations(model, states))
     for name in _linear_bodies(model):
-        first = float(modal_frequencies(model.flexible[name])[0])
+        first = float(modal_frequencies(model.flexible_bodies[name])[0])
         spin = transverse_spin(bodies.motion(name))
         ratio = spin / first if first > 0 else 0.0
         if ratio**2 > MAX_LOAD_RATIO:
@@ -50,5 +52,5 @@ def spin_stiffening_risks(
                 "stiffening", f'"{name}"',
                 f'"{name}" has no geometric stiffening and will spin at {ratio:.2g} times its '
                 f"first frequency: stiffness error about {min(ratio**2, 9.99):.0%}",
-                "leave stiffening on", ratio, MAX_LOAD_RATIO**0.5, before=True,
+                "leave stiffening on", ratio, MAX_LOAD_RATIO**0.5, seen_before_run=True,
             )  # fmt: skip

@@ -37,7 +37,8 @@ def applies_to(model: CompiledScene) -> bool:
 def _may_be_fast(model: CompiledScene, rate: float) -> bool:
     """Whether laws or shapes may move faster than a rate, 1/s."""
     fast = (
-        squared_frequencies(body).max(initial=0.0) > rate * rate for body in model.flexible.values()
+        squared_frequencies(body).max(initial=0.0) > rate * rate
+        for body in model.flexible_bodies.values()
     )
     return may_be_fast(model.scene, rate) or any(fast)
 
@@ -92,7 +93,11 @@ def stability_limited_risks(model: CompiledScene, run: Trajectory) -> Iterator[R
     settings, statistics = run.settings, run.statistics
     if not (_is_adaptive_explicit(settings) and statistics.stability_limited):
         return
-    if model.packed.system.remembers or len(run.t) <= _TRIALS or not np.isfinite(run.q).all():
+    if (
+        model.packed_scene.system.uses_memory
+        or len(run.t) <= _TRIALS
+        or not np.isfinite(run.q).all()
+    ):
         return
     indices = np.unique(np.searchsorted(run.t, np.linspace(run.t[0], run.t[-1], _TRIALS + 1)))
     states = [(float(run.t[k]), run.q[k], run.u[k]) for k in indices]
@@ -109,7 +114,7 @@ def _stiff_risk(means: str, cost: ImplicitCost, evaluations: float, before: bool
     return Risk(
         "stiff", RUN, means,
         f'use method = "{cost.method}": according to trial steps it needs about '
-        f"{cost.steps:.0f} steps of {cost.each:g} evaluations each, "
+        f"{cost.steps:.0f} steps of {cost.evaluations_per_step:g} evaluations each, "
         f"{max(cost.evaluations / evaluations, 0.01):.0%} of the cost",
-        evaluations, cost.evaluations, "evaluations", doubt=False, before=before,
+        evaluations, cost.evaluations, "evaluations", invalidates=False, seen_before_run=before,
     )  # fmt: skip

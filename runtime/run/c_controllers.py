@@ -22,12 +22,12 @@ class Controllers:
     """
 
     def __init__(self, engine: LoopedEngine) -> None:
-        scene, ffi = engine.packed.described, engine.ffi
+        scene, ffi = engine.packed.user_scene, engine.ffi
         self.count = len(scene.controller)
         reject_one_way(engine.packed, f'controller "{scene.controller[0].name}"')
         self.records = ffi.new("mstmm_controller[]", self.count)
         self._keep_alive: list[Any] = []
-        memory_offset = engine.packed.system.held.first
+        memory_offset = engine.packed.system.held_inputs.first
         output_names = [output.name for output in scene.output]
         for record, controller in zip(self.records, scene.controller, strict=True):
             try:
@@ -39,7 +39,9 @@ class Controllers:
             record.measure = measured.record
             record.n_x, record.n_y = len(controller.A), len(controller.inputs)
             record.n_u = len(controller.outputs)
-            arrays = {key: np.array([*row, 0.0]) for key, row in controller.filled.items()}
+            arrays = {
+                key: np.array([*row, 0.0]) for key, row in controller.complete_matrices.items()
+            }
             for key in ("A", "B", "C", "D", "reference", "offset"):
                 setattr(record, key, engine.pointer(arrays[key]))
             scratch = np.zeros(record.n_y + 1), np.zeros(record.n_x + 1)

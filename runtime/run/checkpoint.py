@@ -52,7 +52,7 @@ class Checkpoint:
             raise EnvironmentFailure(
                 f'checkpoint "{path}": its folder does not exist or is not writable'
             )
-        self.asked = {
+        self.run_hashes = {
             "scene": _hash(model.scene.to_toml()),
             "settings": _hash(json.dumps(asdict(settings)) + q.tobytes().hex() + u.tobytes().hex()),
             "kernels": kernels_hash(model.known),
@@ -66,7 +66,7 @@ class Checkpoint:
         """Write state and samples; the old file is replaced only once the new one is complete."""
         rows = {name: getattr(samples, name) for name in _ROWS}
         with replace_atomically(self.path) as temporary, temporary.open("wb") as file:
-            hashes = {key: np.array(text) for key, text in self.asked.items()}
+            hashes = {key: np.array(text) for key, text in self.run_hashes.items()}
             arrays: dict[str, Any] = {"format": np.array(_FORMAT), **state, **rows, **hashes}
             np.savez(file, **arrays)
 
@@ -90,18 +90,18 @@ class Checkpoint:
             ("settings", "the settings or the initial state have"),
             ("kernels", "the compiled kernels have"),
         ):
-            if str(data.get(key)) != self.asked[key]:
+            if str(data.get(key)) != self.run_hashes[key]:
                 raise SceneError(
                     f'checkpoint "{self.path}" belongs to another run: {changed} changed since; '
                     "run without resume to start again"
                 )
         state = {name: self._checked_array(data, name, kind, ndim) for name, kind, ndim in _STATE}
         if not 0.0 <= state["seconds"] < np.inf:
-            raise self.damaged("an impossible elapsed time")
+            raise self.damage_error("an impossible elapsed time")
         rows = [self._checked_array(data, name, kind, ndim) for name, kind, ndim in _SAMPLES]
         times = rows[0]
         if len({len(row) for row in rows}) > 1 or not np.all(times[1:] >= times[:-1]):
-            raise self.damaged("inconsistent samples")
+            raise self.damage_error("inconsistent samples")
         return state, Samples(*rows)
 
     def _checked_array(self, data: State, name: str, kind: str, ndim: int) -> Any:
@@ -109,10 +109,10 @@ class Checkpoint:
         array = data.get(name)
         if array is None or array.dtype.kind != kind or array.ndim != ndim:
             found = "nothing" if array is None else f"{array.dtype} of shape {array.shape}"
-            raise self.damaged(f"{found} as {name}")
+            raise self.damage_error(f"{found} as {name}")
         return array
 
-    def damaged(self, found: str) -> SceneError:
+    def damage_error(self, found: str) -> SceneError:
         """Error for a file whose content no run can have written."""
         return SceneError(
             f'checkpoint "{self.path}" is damaged: it holds {found}; '

@@ -68,10 +68,10 @@ def integrate(
         )
     parse_scheme(settings.scheme)
     reject_loops(
-        model.packed, f'method "{settings.method}"',
+        model.packed_scene, f'method "{settings.method}"',
         "its sources state it for chains and trees alone; genalpha and rodas4p2 do",
     )  # fmt: skip
-    reject_qr_steps(model.packed)
+    reject_qr_steps(model.packed_scene)
     return _Run(model, settings, report_time).run(q, u)
 
 
@@ -104,7 +104,7 @@ class _Run:
     def __init__(
         self, model: CompiledScene, settings: Settings, report_time: Callable[[float], None]
     ) -> None:
-        self.engine, self.settings, self.report_time = model.apart, settings, report_time
+        self.engine, self.settings, self.report_time = model.unmerged_engine, settings, report_time
         self.system = SceneSystem(self.engine)
         self.nq, self.nu = self.engine.nq, self.engine.nu
         self.samples, self.steps = _SampleBuffer(), 0
@@ -124,7 +124,9 @@ class _Run:
             parts = build_parts(self.engine.packed)
             movements = start_movements(self.engine, parts, settings.t_start, q, u)
             form = self._form(parts, movements)
-            start = np.array([form.start(k, movement) for k, movement in enumerate(movements)])
+            start = np.array(
+                [form.initial_motion(k, movement) for k, movement in enumerate(movements)]
+            )
             product = METHODS[settings.method]
             self.stepper = Stepper(
                 self.engine, parts, form, scheme, start, settings.iterations, product
@@ -158,7 +160,7 @@ class _Run:
             while self.steps < self.step_count:
                 allowed = settings.max_steps - self.steps if settings.max_steps else count
                 if allowed <= 0:
-                    return Status.TOO_MANY_STEPS, self._at("more steps than allowed")
+                    return Status.TOO_MANY_STEPS, self._with_time("more steps than allowed")
                 slice_start = time.monotonic()
                 count_left = self.step_count - self.steps - 1
                 failure = self._run_slice(max(1, min(count, allowed, count_left)))
@@ -168,7 +170,10 @@ class _Run:
                 if interrupted:
                     return None, f"interrupted at t = {self.t:.9g} s"
                 if self.samples.bytes > MAX_SAMPLE_BYTES:
-                    return None, f"{self._at('the samples fill the memory')}; give output times"
+                    return (
+                        None,
+                        f"{self._with_time('the samples fill the memory')}; give output times",
+                    )
                 if time.monotonic() - slice_start < SLICE / 2:
                     count = min(2 * count, max_count)
         return Status.FINISHED, f"finished at t = {self.t:.9g} s"
@@ -186,7 +191,7 @@ class _Run:
         if self.steps == self.step_count and len(times):
             times[-1] = settings.t_end
         if len(motions):
-            q, u, memory = self.states.of(motions)
+            q, u, memory = self.states.convert(motions)
             rows = self._rows(times, q, u, memory)
             self._store_samples(times, rows, memory)
             self.t, self.last, self.memory = float(times[-1]), rows[-1], memory[-1]
@@ -196,7 +201,7 @@ class _Run:
 
     def _rows(self, times: Array, q: Array, u: Array, memory: Array) -> Array:
         """State rows (n, nq + nu), with a column of work by the trapezoidal rule if integrated."""
-        if not self.system.with_power:
+        if not self.system.has_power:
             return np.hstack([q, u])
         power = self._powers(times, q, u, memory)
         if self.steps:
@@ -247,13 +252,13 @@ class _Run:
         q = np.ascontiguousarray(rows[:, : self.nq])
         u = np.ascontiguousarray(rows[:, self.nq : self.nq + self.nu])
         parts = list(self.engine.accelerations(t, q, u, memory))
-        if self.system.with_power:
+        if self.system.has_power:
             parts.append(self._powers(t, q, u, memory)[:, None])
         return np.hstack(parts)
 
     # --- end of the run ------------------------------------------------------------------------
 
-    def _at(self, text: str) -> str:
+    def _with_time(self, text: str) -> str:
         at = f"t = {self.t:.9g} s"
         return f"{text} at {at}; last good state at {at}"
 

@@ -30,8 +30,8 @@ class ContactSystem(Protocol):
     engine: LoopedEngine
     memory: Array
 
-    def watched(self, t: float, y: Array) -> Array | None: ...
-    def meeting(self, event: int, t: float, y: Array, u: Array) -> Any: ...
+    def event_values(self, t: float, y: Array) -> Array | None: ...
+    def approach_rate(self, event: int, t: float, y: Array, u: Array) -> Any: ...
 
 
 def check_contact_start(system: ContactSystem, t: float, y: Array) -> None:
@@ -40,8 +40,8 @@ def check_contact_start(system: ContactSystem, t: float, y: Array) -> None:
     Raises SceneError where the state rests on a bounce event or a hard stop, is past a bounce event
     without leaving it, or is past a hard stop.
     """
-    bounces = system.engine.packed.watched.bounces
-    values = system.watched(t, y) if bounces else None
+    bounces = system.engine.packed.event_functions.bounces
+    values = system.event_values(t, y) if bounces else None
     if values is None:
         return
     for bounce in bounces:
@@ -52,7 +52,7 @@ def check_contact_start(system: ContactSystem, t: float, y: Array) -> None:
 
 
 def _check_bounce(system: ContactSystem, bounce: Bounce, value: float, t: float, y: Array) -> None:
-    contact = system.meeting(bounce.event, t, y, _speeds(system, y))
+    contact = system.approach_rate(bounce.event, t, y, _speeds(system, y))
     tolerance = _TOLERANCE * contact.reach
     if not value >= -tolerance:
         return
@@ -75,14 +75,14 @@ def _approach_rate(system: ContactSystem, bounce: Bounce, t: float, y: Array) ->
 
     Negative where the state leaves the contact or its acceleration releases it, 0 where it rests.
     """
-    contact = system.meeting(bounce.event, t, y, _speeds(system, y))
+    contact = system.approach_rate(bounce.event, t, y, _speeds(system, y))
     tolerance = _TOLERANCE * (contact.size + contact.steepness)
     if abs(contact.rate) > tolerance:
         return float(contact.rate)
     rates = []
     for dt in _RELEASE_TIMES:
         later = _extrapolate(system, t, y, dt)
-        contact = system.meeting(bounce.event, t + dt, later, _speeds(system, later))
+        contact = system.approach_rate(bounce.event, t + dt, later, _speeds(system, later))
         rates.append(float(contact.rate))
     return min(rates) if min(rates) < -tolerance else 0.0
 
@@ -98,7 +98,7 @@ def _extrapolate(system: ContactSystem, t: float, y: Array, dt: float) -> Array:
 
 def _message(system: ContactSystem, bounce: Bounce, y: Array, value: float, is_past: bool) -> str:
     packed = system.engine.packed
-    where, when = packed.scene.happening(bounce.event), packed.scene.events[bounce.event].when
+    where, when = packed.scene.event_label(bounce.event), packed.scene.events[bounce.event].when
     if not _is_hard_stop(system, bounce):
         found = (
             f"past the contact by {value:.6g} and does not leave it"

@@ -74,10 +74,11 @@ class ErrorEstimate:
         q: unit -> (n,) largest error of any coordinate of that unit up to t; the rotation error of
             a quaternion counts as rad.
         u: unit -> (n,) the same for speeds.
-        horizon: s; predictability horizon, past which the runs differ too much; None without.
-        tenfold: s in which errors grow tenfold, None if they do not grow exponentially.
+        divergence_time: s; predictability horizon, past which the runs differ too much; None
+            without.
+        tenfold_time: s in which errors grow tenfold, None if they do not grow exponentially.
         reference: description of the second run.
-        moved: unit -> largest excursion of coordinates of that unit, the scale of their errors.
+        excursion: unit -> largest excursion of coordinates of that unit, the scale of their errors.
         covered: s; end of the second run where it failed before the end of the first, so that the
             error beyond is unknown; None for the whole run.
     """
@@ -85,25 +86,25 @@ class ErrorEstimate:
     t: Array
     q: dict[str, Array]
     u: dict[str, Array]
-    horizon: float | None
-    tenfold: float | None
+    divergence_time: float | None
+    tenfold_time: float | None
     reference: str
-    moved: dict[str, float] = field(default_factory=dict)
+    excursion: dict[str, float] = field(default_factory=dict)
     covered: float | None = None
 
     @property
-    def nowhere(self) -> bool:
+    def diverges_at_start(self) -> bool:
         """True if the horizon is not after the first sample."""
-        return self.horizon is not None and self.horizon <= self.t[0]
+        return self.divergence_time is not None and self.divergence_time <= self.t[0]
 
-    def whole(self, kind: str = "q") -> dict[str, float]:
+    def difference(self, kind: str = "q") -> dict[str, float]:
         """Unit -> largest error of q or u over all common samples, also past the horizon."""
         values: dict[str, Array] = getattr(self, kind)
         return {unit: float(v.max(initial=0.0)) for unit, v in values.items()}
 
     def largest(self, kind: str = "q") -> dict[str, float]:
         """Unit -> largest error of q or u up to the horizon, or over all common samples."""
-        within = self.t < np.inf if self.horizon is None else self.t <= self.horizon
+        within = self.t < np.inf if self.divergence_time is None else self.t <= self.divergence_time
         values: dict[str, Array] = getattr(self, kind)
         return {unit: float(v[within].max(initial=0.0)) for unit, v in values.items()}
 
@@ -160,8 +161,8 @@ def _max_abs(values: Array) -> float:
 def made_same_steps(first: Trajectory, second: Trajectory) -> bool:
     """True if two runs made the same steps, so that their difference is no error estimate."""
     a, b = first.statistics, second.statistics
-    counts = (a.steps, a.rejected, a.evaluations, a.smallest_step, a.largest_step)
-    return counts == (b.steps, b.rejected, b.evaluations, b.smallest_step, b.largest_step)
+    counts = (a.steps, a.rejected_steps, a.evaluations, a.smallest_step, a.largest_step)
+    return counts == (b.steps, b.rejected_steps, b.evaluations, b.smallest_step, b.largest_step)
 
 
 def compare(

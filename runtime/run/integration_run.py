@@ -19,7 +19,7 @@ from ..integrate.steppers import AUTO, Tableau, check_steps, get
 from ..integrate.steppers.implicit_methods import NewmarkFamily
 from ..packing.loops.unsupported_loops import reject_loop_method, reject_speed_constraints
 from ..platform_support.interrupts import record_interrupts
-from .method_switching import Choice
+from .method_switching import MethodChoice
 from .run_notes import chattering_note, missed_switch_note, step_too_long_note
 from .scene_system import SceneSystem
 from .stop_messages import rest_note, stop_message
@@ -52,7 +52,7 @@ def make_run(
     tableau = initial_method(system, settings)
     start = system.begin(settings.t_start, q, u)
     if uses_position_constraints(settings):
-        system.ask_positions()
+        system.enforce_positions()
     time_map = system.engine.packed.time_map(settings.t_start, settings.t_end)
     return Integrator(
         system.engine.ffi, system.engine.lib, system.system, tableau, settings, start,
@@ -87,7 +87,7 @@ def tolerances(
 ) -> Array:
     """Absolute tolerance per state component; that of the work is scaled by the start energy."""
     atol = np.full(len(start), settings.atol)
-    if system.with_power:
+    if system.has_power:
         start_energy = (energy or energy_at)(system, settings.t_start, start)
         atol[-1] = settings.atol + _WORK_TOLERANCE * settings.rtol * (start_energy or 1.0)
     return atol
@@ -116,16 +116,16 @@ def energy_at(system: SceneSystem, t: float, y: Array) -> float:
     )
 
 
-def method_choice(system: SceneSystem, settings: Settings, run: Integrator) -> Choice | None:
+def method_choice(system: SceneSystem, settings: Settings, run: Integrator) -> MethodChoice | None:
     """Choice of method for a new run of method "auto", else None."""
-    return Choice(system, settings, run) if settings.method == AUTO else None
+    return MethodChoice(system, settings, run) if settings.method == AUTO else None
 
 
 def advance(
     run: Integrator,
     observe: Callable[[Integrator], None] | None = None,
     steps: int = 0,
-    choice: Choice | None = None,
+    choice: MethodChoice | None = None,
 ) -> Status | None:
     """Advance a run to its end and return its status.
 
@@ -136,7 +136,7 @@ def advance(
         while True:
             status = run.advance(SLICE, steps)
             if choice is not None:
-                choice.look(run)
+                choice.switch_if_indicated(run)
                 status = Status.RUNNING if choice.rescue(run) else status
             if status is not Status.RUNNING or run.steps == steps:
                 return status
@@ -155,7 +155,7 @@ def trajectory(
     earlier: Samples | None = None,
 ) -> Trajectory:
     """Trajectory of a run, after the samples of an earlier process."""
-    samples = run.samples if earlier is None else Samples.joined([earlier, run.samples])
+    samples = run.samples if earlier is None else Samples.join([earlier, run.samples])
     failure = run.failure
     if status is Status.STOPPED and rest_note(system, run.event):
         status = Status.CAME_TO_REST
@@ -164,7 +164,9 @@ def trajectory(
         None if failure is None else failure.time,
     )  # fmt: skip
     chattering = () if run.chatter is None else (chattering_note(system, run.chatter),)
-    missed = () if run.unseen is None else (missed_switch_note(system, *run.unseen),)
+    missed = (
+        () if run.missed_condition is None else (missed_switch_note(system, *run.missed_condition),)
+    )
     risks = (*chattering, *missed, *step_too_long_note(result))
     return replace(result, risks=risks) if risks else result
 
@@ -205,7 +207,7 @@ def split(
         )
     nq, nu = system.engine.nq, system.engine.nu
     y, residual = project_samples(system, samples.t, samples.y, samples.memory)
-    work = y[:, nq + nu] if system.with_power else np.zeros(len(samples.t))
+    work = y[:, nq + nu] if system.has_power else np.zeros(len(samples.t))
     return Trajectory(
         samples.t, y[:, :nq], y[:, nq : nq + nu], samples.memory, work, samples.event, status,
         message, settings, statistics, fail_time, (), residual,
@@ -222,7 +224,7 @@ def _is_among(t: Array, times: Array) -> NDArray[np.bool_]:
 
 def _has_constraints(engine: LoopedEngine) -> bool:
     """True if drives or closed loops determine some coordinates."""
-    return bool(engine.packed.system.driven or engine.packed.system.closes)
+    return bool(engine.packed.system.driven or engine.packed.system.has_loops)
 
 
 def needs_projection(engine: LoopedEngine) -> bool:

@@ -52,7 +52,7 @@ class MeasuredQuantities:
         self, engine: LoopedEngine, expressions: Sequence[Expression], others: Sequence[str] = ()
     ) -> None:
         self._engine, self._graph, self._others = engine, Graph(), others
-        self._references = BodyReferences(engine.packed.described.skeleton)
+        self._references = BodyReferences(engine.packed.user_scene.skeleton)
         self._probes: dict[str, int] = {}
         self._read = set[str]()
         nodes = [expression.build(self._graph, self._node) for expression in expressions]
@@ -175,7 +175,7 @@ class MeasuredQuantities:
                     return "points", width * probe + columns.start + axis
         return None
 
-    def at(self, run: Any, t: float, y: Array) -> Array:
+    def evaluate(self, run: Any, t: float, y: Array) -> Array:
         """Values (numbers,) at time t (s) and state y (n_state,); `run` is a `mstmm_scene_run *`.
 
         Raises NumericalFailure where the state cannot be evaluated.
@@ -201,18 +201,18 @@ class MeasuredOutputs:
     """Outputs of a scene that C evaluates; `others` are the names of the remaining outputs."""
 
     def __init__(self, engine: LoopedEngine) -> None:
-        self.others, self._sizes = list[str](), dict[str, int]()
+        self.remaining_names, self._sizes = list[str](), dict[str, int]()
         expressions = list[Expression]()
-        for output in engine.packed.described.output:
+        for output in engine.packed.user_scene.output:
             components = _output_expressions(engine, output)
             expressions += components
             self._sizes[output.name] = len(components)
-            self.others += [] if components else [output.name]
+            self.remaining_names += [] if components else [output.name]
         self._measured = MeasuredQuantities(engine, expressions)
 
-    def at(self, run: Any, t: float, y: Array) -> dict[str, Any]:
+    def evaluate(self, run: Any, t: float, y: Array) -> dict[str, Any]:
         """Output name -> number or vector (3,) at time t (s) and state y (n_state,)."""
-        values, outputs, first = self._measured.at(run, t, y), dict[str, Any](), 0
+        values, outputs, first = self._measured.evaluate(run, t, y), dict[str, Any](), 0
         for name, size in self._sizes.items():
             if size:
                 components = values[first : first + size]

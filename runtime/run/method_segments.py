@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
+
+from mstmm.plain_data import stored_as
 
 
 @dataclass(frozen=True)
@@ -14,18 +16,21 @@ class MethodSegment:
     Attributes:
         t: start of the segment, s.
         method: name of the method.
-        rate: |lambda| of the fastest motion of laws and modes at t, 1/s; None if not computed.
-        why: reason for the method.
+        fastest_rate: |lambda| of the fastest motion of laws and modes at t, 1/s; None if not
+            computed.
+        reason: reason for the method.
     """
 
     t: float
     method: str
-    rate: float | None
-    why: str
+    fastest_rate: float | None = field(metadata=stored_as("rate"))
+    reason: str = field(metadata=stored_as("why"))
 
     def __str__(self) -> str:
-        motion = "" if self.rate is None else f", fastest motion {self.rate:.3g} 1/s"
-        return f"{self.method} from t = {self.t:.6g} s ({self.why}{motion})"
+        motion = (
+            "" if self.fastest_rate is None else f", fastest motion {self.fastest_rate:.3g} 1/s"
+        )
+        return f"{self.method} from t = {self.t:.6g} s ({self.reason}{motion})"
 
 
 def from_rows(rows: Sequence[dict[str, Any]]) -> tuple[MethodSegment, ...]:

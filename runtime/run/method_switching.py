@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import asdict
 
 from mstmm.errors import NumericalFailure, SceneError
+from mstmm.plain_data import to_plain
 
 from ..integrate.c_loop import Integrator
 from ..integrate.settings import Settings
@@ -41,22 +41,22 @@ def implicit_method(rtol: float) -> str:
     return "rodas4p2" if rtol >= _LOOSE_RTOL else "rodas5p"
 
 
-class Choice:
-    """Choice of method within one run; call `look` between its slices."""
+class MethodChoice:
+    """Choice of method within one run; call `switch_if_indicated` between its slices."""
 
     def __init__(self, system: SceneSystem, settings: Settings, run: Integrator) -> None:
         self._system, self._settings = system, settings
         self._fastest: FastestMode | None = None
         self._request = (_STIFF_STEPS, 0, 0.0)
         self._first_step = 0  # steps of the run before the present method
-        self.stretches = [
+        self.segments = [
             MethodSegment(settings.t_start, AUTO_EXPLICIT, None, "initial method of every run")
         ]
-        run.call_back(*self._request)
+        run.request_return(*self._request)
 
-    def look(self, run: Integrator) -> None:
+    def switch_if_indicated(self, run: Integrator) -> None:
         """Change the method if the run returned for that and its steps indicate it."""
-        rate = self._fastest_rate(run) if run.asked else None
+        rate = self._fastest_rate(run) if run.callback_requested else None
         if rate is None:
             return
         if run.tableau.implicit:
@@ -74,8 +74,8 @@ class Choice:
         if not (run.tableau.implicit and run.no_step):
             return False
         reason = f"{run.tableau.name} found no step"
-        run.change(get(AUTO_EXPLICIT))
-        self.stretches.append(MethodSegment(run.t, AUTO_EXPLICIT, None, reason))
+        run.switch_method(get(AUTO_EXPLICIT))
+        self.segments.append(MethodSegment(run.t, AUTO_EXPLICIT, None, reason))
         self._request_return(run, 0)
         return True
 
@@ -91,7 +91,7 @@ class Choice:
                 self._fastest = FastestMode(engine, system.memory)
             except SceneError as error:
                 reason = f"no implicit method: {error}"
-                self.stretches.append(MethodSegment(run.t, AUTO_EXPLICIT, None, reason))
+                self.segments.append(MethodSegment(run.t, AUTO_EXPLICIT, None, reason))
                 self._request_return(run, 0)
                 return None
         q, u = run.y[: engine.nq], run.y[engine.nq : engine.nq + engine.nu]
@@ -121,9 +121,9 @@ class Choice:
         steps = run.steps
         if implicit:
             self._system.offer_tangent()
-        run.change(get(method))
+        run.switch_method(get(method))
         reason = "stability limited the steps" if implicit else "stable at the present step size"
-        self.stretches.append(MethodSegment(run.t, method, rate, reason))
+        self.segments.append(MethodSegment(run.t, method, rate, reason))
         self._first_step = steps
         if implicit:
             self._request_return(run, _NONSTIFF_STEPS, steps + _NONSTIFF_STEPS, _stable_step(rate))
@@ -135,14 +135,14 @@ class Choice:
     ) -> None:
         """Make the C loop return after `signs` indications, or at `steps` steps (0: never)."""
         self._request = (signs, steps, short)
-        run.call_back(*self._request)
+        run.request_return(*self._request)
 
     # --- checkpoints ----------------------------------------------------------------------------
 
     def state(self) -> str:
         """State of the choice as JSON text, for a checkpoint."""
         return json.dumps({
-            "stretches": [asdict(s) for s in self.stretches],
+            "stretches": to_plain(self.segments),
             "asked_for": self._request, "since": self._first_step,
         })  # fmt: skip
 
@@ -153,19 +153,19 @@ class Choice:
         """
         try:
             data = json.loads(state)
-            self.stretches = list(from_rows(data["stretches"]))
+            self.segments = list(from_rows(data["stretches"]))
             signs, steps, short = data["asked_for"]
             self._request = (int(signs), int(steps), float(short))
             self._first_step = int(data["since"])
-            method = self.stretches[-1].method
+            method = self.segments[-1].method
         except (KeyError, TypeError, IndexError) as error:
             raise ValueError(str(error)) from None
         if method not in (AUTO_EXPLICIT, implicit_method(self._settings.rtol)):
             raise ValueError(method)
         if method != AUTO_EXPLICIT:
             self._system.offer_tangent()
-            run.change(get(method))
-        run.call_back(*self._request)
+            run.switch_method(get(method))
+        run.request_return(*self._request)
 
 
 def _stable_step(rate: float) -> float:

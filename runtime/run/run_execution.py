@@ -21,7 +21,7 @@ from .checkpoint import Checkpoint, State
 from .engine_choice import FUSED, LOOPED, code_at_start, code_if_it_pays, steps_until_decision
 from .error_estimate import ErrorEstimate, compare, made_same_steps, reference_settings
 from .integration_run import advance, method_choice, status_message, trajectory
-from .method_switching import Choice
+from .method_switching import MethodChoice
 from .start_cache import StartCache, return_start_cache, take_start_cache
 from .step_stability import check_later, check_step
 from .trajectory import Trajectory
@@ -36,7 +36,7 @@ Progress = Callable[[float, float], None]
 #: Speed in rad/s or m/s above which a run counts as diverged.
 _DIVERGED_SPEED = 1e9
 #: Seconds of wall time between checkpoints.
-CHECKPOINT_EVERY = 30.0
+CHECKPOINT_INTERVAL = 30.0
 
 
 class RunMonitor:
@@ -54,28 +54,28 @@ class RunMonitor:
         self.run, self.notes = 0, list[str]()
         self.checkpoint: Checkpoint | None = None
         self.engine = LOOPED
-        self.choice: Choice | None = None
-        self.before = 0.0  # wall time in s of earlier processes on the run
+        self.choice: MethodChoice | None = None
+        self.earlier_seconds = 0.0  # wall time in s of earlier processes on the run
         self._begun = self._saved = time.monotonic()
 
-    def tell(self, t: float) -> None:
+    def report_progress(self, t: float) -> None:
         """Report that the run has reached time t (s); an exception of the callback ends the run."""
         if self.progress is None:
             return
         start, end = self.settings.t_start, self.settings.t_end
         self.progress(start + ((t - start) + self.run * (end - start)) / self.runs, end)
 
-    def look(self, run: Integrator, earlier: Samples | None) -> None:
+    def report_and_save(self, run: Integrator, earlier: Samples | None) -> None:
         """Report progress between slices of a run, and save a checkpoint when one is due.
 
         An exception of the progress callback is raised after a checkpoint is saved.
         """
         try:
-            self.tell(run.t)
+            self.report_progress(run.t)
         except BaseException:
             self.save(run, earlier)
             raise
-        if time.monotonic() - self._saved > CHECKPOINT_EVERY:
+        if time.monotonic() - self._saved > CHECKPOINT_INTERVAL:
             self.save(run, earlier)
 
     def save(self, run: Integrator, earlier: Samples | None, message: str = "") -> None:
@@ -88,8 +88,10 @@ class RunMonitor:
                 methods = "" if self.choice is None else self.choice.state()
                 texts = {"engine": self.engine, "message": message, "methods": methods}
                 entries = {name: np.array(text) for name, text in texts.items()}
-                entries["seconds"] = np.array(self.before + time.monotonic() - self._begun)
-                self.checkpoint.save({**run.state(), **entries}, _joined(earlier, run.samples))
+                entries["seconds"] = np.array(self.earlier_seconds + time.monotonic() - self._begun)
+                self.checkpoint.save(
+                    {**run.state(), **entries}, _join_samples(earlier, run.samples)
+                )
             except (MstmmError, MemoryError) as error:
                 note = f"no checkpoint written: {error or 'not enough memory'}"
                 if note not in self.notes:
@@ -97,8 +99,8 @@ class RunMonitor:
         self._saved = time.monotonic()
 
 
-def _joined(earlier: Samples | None, samples: Samples) -> Samples:
-    return samples if earlier is None else Samples.joined([earlier, samples])
+def _join_samples(earlier: Samples | None, samples: Samples) -> Samples:
+    return samples if earlier is None else Samples.join([earlier, samples])
 
 
 def first_run(
@@ -121,7 +123,7 @@ def first_run(
         package = (
             classical_run if settings.method in classical_run.METHODS else external_integrators
         )
-        return package.integrate(model, settings, q, u, watch.tell)
+        return package.integrate(model, settings, q, u, watch.report_progress)
     classical_run.reject_classical_options(settings)
     state, earlier = _load_checkpoint(watch.checkpoint) if resume else (None, None)
     recorded = None if state is None else str(state["engine"])
@@ -132,7 +134,7 @@ def first_run(
     message = "" if run.status is Status.RUNNING else status_message(system, run, run.status)
     if state is not None and earlier is not None and watch.checkpoint is not None:
         message = _restore_run(run, state, earlier, watch.checkpoint, watch.choice)
-        watch.before = float(state["seconds"])
+        watch.earlier_seconds = float(state["seconds"])
     decision_step = 0 if code else steps_until_decision(model, settings)
     status: Status | None = run.status
     if decision_step and status is Status.RUNNING and run.steps < decision_step:
@@ -146,12 +148,12 @@ def first_run(
     watch.engine = FUSED if code else LOOPED
     if status is Status.RUNNING:
         status, message = _advance_and_save(system, run, watch, earlier)
-    segments = () if watch.choice is None else tuple(watch.choice.stretches)
+    segments = () if watch.choice is None else tuple(watch.choice.segments)
     if not watch.named and len(segments) == 1:
         settings, segments = replace(settings, method=settings.first_method), ()
     result = trajectory(system, run, settings, status, message, earlier)
-    if watch.before:
-        result = replace(result, before=watch.before)
+    if watch.earlier_seconds:
+        result = replace(result, earlier_seconds=watch.earlier_seconds)
     if segments:
         result = replace(result, methods=segments)
     if status is not None and not result.is_comparable:
@@ -171,7 +173,7 @@ def _failure_message(engine: LoopedEngine, run: Trajectory, q: Array, u: Array) 
     diverged = run.status is Status.NOT_FINITE or max_speed > _DIVERGED_SPEED
     if (step is None or step.risk is None) and diverged and REMEDY not in run.message:
         step = check_later(engine, run) or step
-    return run.message if step is None else step.blamed(run.message)
+    return run.message if step is None else step.explain_failure(run.message)
 
 
 def _advance_and_save(
@@ -179,7 +181,7 @@ def _advance_and_save(
 ) -> tuple[Status | None, str]:
     """Advance a run and save its end; no interrupt takes effect between the two."""
     with record_interrupts():
-        status = advance(run, lambda now: watch.look(now, earlier), steps, watch.choice)
+        status = advance(run, lambda now: watch.report_and_save(now, earlier), steps, watch.choice)
         message = status_message(system, run, status)
         if status is not Status.RUNNING:
             watch.save(run, earlier, "" if status is None else message)
@@ -187,7 +189,11 @@ def _advance_and_save(
 
 
 def _restore_run(
-    run: Integrator, state: State, earlier: Samples, checkpoint: Checkpoint, choice: Choice | None
+    run: Integrator,
+    state: State,
+    earlier: Samples,
+    checkpoint: Checkpoint,
+    choice: MethodChoice | None,
 ) -> str:
     """Restore a run from its checkpoint; returns its final message, "" if it had not ended."""
     try:
@@ -196,9 +202,9 @@ def _restore_run(
         run.restore(state)
         ended = run.status is not Status.RUNNING
     except ValueError:  # a status or a method that does not exist
-        raise checkpoint.damaged("an impossible state") from None
-    if not run.fits(earlier):
-        raise checkpoint.damaged("samples of another size")
+        raise checkpoint.damage_error("an impossible state") from None
+    if not run.accepts(earlier):
+        raise checkpoint.damage_error("samples of another size")
     return str(state["message"]) if ended else ""
 
 
@@ -216,7 +222,7 @@ def second_run(
 
     Failures of the second run and equal steps are noted in `watch`.
     """
-    time_map = model.packed.time_map(first.settings.t_start, first.settings.t_end)
+    time_map = model.packed_scene.time_map(first.settings.t_start, first.settings.t_end)
     settings, reference = reference_settings(first, time_map.breaks.tolist())
     watch.run = 1
     second = first_run(model, settings, q, u, watch)
@@ -228,4 +234,4 @@ def second_run(
         return None
     if not len(np.intersect1d(first.t, second.t)) or second.status is None:
         return None
-    return compare(model.layout, first, second, reference, q)
+    return compare(model.coordinate_layout, first, second, reference, q)

@@ -9,7 +9,7 @@ import numpy as np
 from mstmm.risk import RUN, Risk
 
 from ..integrate.steppers import get
-from ..packing.switch_margins import MOST
+from ..packing.switch_margins import MAX_SWITCHES
 
 if TYPE_CHECKING:
     from ..integrate.settings import Settings
@@ -29,15 +29,22 @@ def unmapped_expression_notes(packed: PackedScene, settings: Settings) -> tuple[
     time_map = packed.time_map(settings.t_start, settings.t_end)
     risks = list(time_map.notes)
     if settings.step is not None:
-        risks += [risk] if (risk := time_map.too_long(settings.step)) else []
-    count = len(packed.watched.switches)
-    if count > MOST:
-        risks.append(Risk(
-            "switches", RUN,
-            f"more than {MOST} conditions depend on the motion; only the first {MOST} end a step "
-            "where they switch", "give max_step so that none is missed",
-            count, MOST, before=True,
-        ))  # fmt: skip
+        risks += [risk] if (risk := time_map.missed_feature_risk(settings.step)) else []
+    count = len(packed.event_functions.switches)
+    if count > MAX_SWITCHES:
+        risks.append(
+            Risk(
+                "switches",
+                RUN,
+                f"more than {MAX_SWITCHES} conditions depend on the motion; only the first "
+                f"{MAX_SWITCHES} end a step "
+                "where they switch",
+                "give max_step so that none is missed",
+                count,
+                MAX_SWITCHES,
+                seen_before_run=True,
+            )
+        )
     return tuple(risks)
 
 
@@ -50,7 +57,7 @@ def step_too_long_note(run: Trajectory) -> tuple[Risk, ...]:
     settings, statistics = run.settings, run.statistics
     if settings.step is None:
         return ()
-    error, tableau = statistics.sum_local_error, get(settings.method, settings.radius)
+    error, tableau = statistics.sum_of_local_errors, get(settings.method, settings.radius)
     if not tableau.implicit:
         return ()
     if settings.step > settings.t_end - settings.t_start:
@@ -59,7 +66,7 @@ def step_too_long_note(run: Trajectory) -> tuple[Risk, ...]:
             "step-accuracy", RUN,
             f"step = {settings.step:.4g} s is longer than the run of {span:.4g} s, which becomes "
             "one step", f"use a step below {span:.4g} s", settings.step, span, "s",
-            before=True,
+            seen_before_run=True,
         ),)  # fmt: skip
     if error is None or len(run.t) < 3:
         return ()
@@ -80,7 +87,7 @@ def step_too_long_note(run: Trajectory) -> tuple[Risk, ...]:
 def missed_switch_note(system: SceneSystem, index: int, since: float) -> Risk:
     """Risk that a step missed a fast event or, for an index past the events, a fast switch."""
     n = len(system.event_names)
-    where = system.event_names[index] if index < n else system.switches[index - n].what
+    where = system.event_names[index] if index < n else system.switches[index - n].description
     return Risk(
         "switches", where,
         f"the condition of {where} changes so fast from t = {since:.9g} s on that it may have held "
@@ -90,7 +97,7 @@ def missed_switch_note(system: SceneSystem, index: int, since: float) -> Risk:
 
 def chattering_note(system: SceneSystem, chatter: tuple[int, float]) -> Risk:
     """Risk that a switch chatters, from its index and the time (s) at which it began."""
-    where, since = system.switches[chatter[0]].what, chatter[1]
+    where, since = system.switches[chatter[0]].description, chatter[1]
     return Risk(
         "chatter", where,
         f"{where} chatters from t = {since:.9g} s on: the forces on both sides drive the motion "

@@ -16,7 +16,7 @@ from mstmm.ir.tape import INSTRUCTION_WIDTH, OUTPUT_WIDTH, Tape
 from mstmm.scene import Scene
 
 from ..engine.engine_calls import Probe
-from ..engine.live_inputs import LiveInputs, Places
+from ..engine.live_inputs import IndexPairs, LiveInputs
 from ..engine.looped_engine import LoopedEngine
 from ..engine.tangent_matrix import TangentMatrix
 from ..kernels.fused_library import FusedLibrary
@@ -26,7 +26,7 @@ from ..packing.hinge_release import hinges_released_by_time
 from ..packing.packed_scene import resize_workspace
 from ..packing.qr_sweep import reject_qr_steps
 from ..packing.records.bounce_records import Bounce
-from ..packing.switch_margins import MOST
+from ..packing.switch_margins import MAX_SWITCHES
 from .c_controllers import Controllers
 from .contact_start import check_contact_start
 
@@ -39,10 +39,10 @@ class SceneCode:
     tangent for implicit methods, None without one.
     """
 
-    one: FusedLibrary
+    scalar: FusedLibrary
     lanes: FusedLibrary | None
     numbers: Array
-    inputs: Places
+    inputs: IndexPairs
     implicit: Callable[[], FusedLibrary | None]
 
 
@@ -50,22 +50,22 @@ class SceneSystem:
     """`mstmm_system` of a model, with its own memory for events, power and turns.
 
     With `compiled` the right-hand side is fused code, while events and projection use the engine.
-    Without `with_power` the work of non-conservative loads is not integrated.
+    Without `has_power` the work of non-conservative loads is not integrated.
     """
 
     def __init__(
         self, engine: LoopedEngine, compiled: SceneCode | None = None, with_power: bool = True
     ) -> None:
         packed, ffi = engine.packed, engine.ffi
-        self.engine, self.kept = engine, list[Any]()
+        self.engine, self.keep_alive = engine, list[Any]()
         actions, self.event_names = _event_actions(engine)
-        self.switches, self.on_positions = packed.watched.switches, False
+        self.switches, self.uses_position_level = packed.event_functions.switches, False
         self.memory = engine.start_memory()
         model, system = packed.model, packed.system
         self.run = run = ffi.new("mstmm_scene_run *")
         run.model = model
         does_work = bool(system.laws or system.driven or system.loads or system.forces)
-        does_work = does_work or bool(system.couplings) or bool(packed.watched.bounces)
+        does_work = does_work or bool(system.couplings) or bool(packed.event_functions.bounces)
         does_work = does_work or any(
             body.D.any() or body.drag is not None for body in packed.flexible.values()
         )
@@ -74,17 +74,17 @@ class SceneSystem:
         quaternions = np.append(packed.layout.quaternions, 0).astype(np.int32)
         run.quaternions = ffi.from_buffer("int[]", quaternions)
         run.n_quaternions = len(packed.layout.quaternions)
-        self.kept += [model, quaternions]
-        if packed.watched.tape is not None:
-            self._set_events(packed.watched.tape, packed.watched.ends, actions)
-        if packed.described.controller:
+        self.keep_alive += [model, quaternions]
+        if packed.event_functions.tape is not None:
+            self._set_events(packed.event_functions.tape, packed.event_functions.ends, actions)
+        if packed.user_scene.controller:
             controllers = Controllers(engine)
             run.n_controllers, run.controllers = controllers.count, controllers.records
-            self.kept.append(controllers)
-        if system.closes and system.strained >= 0:
+            self.keep_alive.append(controllers)
+        if system.has_loops and system.strain_index >= 0:
             speeds = np.zeros(2 * engine.nu + engine.nq)
             run.speeds = engine.pointer(speeds)
-            self.kept.append(speeds)
+            self.keep_alive.append(speeds)
         self.workspace = np.zeros(packed.workspace)
         run.workspace = engine.pointer(self.workspace)
         self._code = compiled
@@ -93,12 +93,12 @@ class SceneSystem:
         self.system = ffi.new("mstmm_system *")
         engine.lib.mstmm_scene_system(run, self.system)
 
-    def goes_by(self, compiled: SceneCode | None) -> bool:
+    def uses_code(self, compiled: SceneCode | None) -> bool:
         """True if the right-hand side is this fused code, or the looped engine for None."""
         code = self._code
         if code is None or compiled is None:
             return code is compiled
-        same_library = code.one is compiled.one and code.lanes is compiled.lanes
+        same_library = code.scalar is compiled.scalar and code.lanes is compiled.lanes
         return same_library and code.numbers is compiled.numbers
 
     def offer_tangent(self) -> None:
@@ -113,19 +113,19 @@ class SceneSystem:
         base_state, coordinates = np.zeros(size), np.zeros(engine.nu + 1, dtype=np.int32)
         stage.workspace, stage.work = run.workspace, engine.pointer(work)
         run.base, run.stage, run.known = base.record, stage, engine.pointer(base_state)
-        run.steady = int(engine.packed.system.steady)
+        run.steady = int(engine.packed.system.is_autonomous)
         run.coordinates = engine.ffi.from_buffer("int[]", coordinates)
         engine.lib.mstmm_scene_implicit(run, self.system)
-        self.kept += [base, stage, work, base_state, coordinates]
+        self.keep_alive += [base, stage, work, base_state, coordinates]
         if self._code is not None and (implicit := self._code.implicit()) is not None:
             self._set_implicit_code(implicit, self._code.numbers)
 
-    def ask_positions(self) -> None:
+    def enforce_positions(self) -> None:
         """Make implicit steps satisfy closed loops at position level instead of speed level.
 
         Call after `offer_tangent`.  Steps that are cut short keep to the speed level.
         """
-        self.on_positions = True
+        self.uses_position_level = True
         self.engine.lib.mstmm_scene_on_positions(self.run)
 
     def _set_implicit_code(self, code: FusedLibrary, start_numbers: Array) -> None:
@@ -134,7 +134,7 @@ class SceneSystem:
         scratch = np.zeros(lib.mstmm_implicit_code_size(code.descriptor))
         pointers = engine.pointer(numbers), engine.pointer(scratch)
         lib.mstmm_implicit_by_code(self.run, code.descriptor, *pointers)
-        self.kept += [numbers, scratch, *pointers]
+        self.keep_alive += [numbers, scratch, *pointers]
 
     def _set_fused_code(self, code: SceneCode) -> None:
         engine, lib = self.engine, self.engine.lib
@@ -142,13 +142,13 @@ class SceneSystem:
         numbers = np.array(code.numbers)  # own copy: C writes the inputs into it during the run
         live = LiveInputs(engine.packed.system, code.inputs)
         if live.varies:
-            self.run.live.n, self.run.live.inputs = len(live.places), engine.packed.model.inputs
-            self.run.live.places = engine.ffi.from_buffer("int[]", live.places)
-            self.kept.append(live)
-        scratch = np.zeros(max(1, lib.mstmm_compiled_size(code.one.descriptor, lanes)))
+            self.run.live.n, self.run.live.inputs = len(live.indices), engine.packed.model.inputs
+            self.run.live.places = engine.ffi.from_buffer("int[]", live.indices)
+            self.keep_alive.append(live)
+        scratch = np.zeros(max(1, lib.mstmm_compiled_size(code.scalar.descriptor, lanes)))
         pointers = engine.pointer(numbers), engine.pointer(scratch)
-        lib.mstmm_scene_compiled(self.run, code.one.descriptor, lanes, *pointers)
-        self.kept += [code, numbers, scratch, *pointers]
+        lib.mstmm_scene_compiled(self.run, code.scalar.descriptor, lanes, *pointers)
+        self.keep_alive += [code, numbers, scratch, *pointers]
 
     def _set_events(
         self, tape: Tape, ends: Sequence[tuple[str, str]], actions: list[tuple[int, int]]
@@ -156,7 +156,7 @@ class SceneSystem:
         """Write tape, probes and actions of events; `actions` are pairs (action, memory index)."""
         engine, ffi, run = self.engine, self.engine.ffi, self.run
         resize_workspace(engine.packed, tape.slots)
-        run.event_tape = c_tape(ffi, tape, self.kept)
+        run.event_tape = c_tape(ffi, tape, self.keep_alive)
         probes = [Probe(*engine.packed.end(b + (f".{e}" if e else ""))) for b, e in ends]
         records = engine.probes(probes)
         scratch = int(engine.lib.MSTMM_PROBE_NUMBERS) + engine.nq + engine.nu
@@ -169,30 +169,30 @@ class SceneSystem:
         if _reads_velocities(tape):
             later_state = np.zeros(engine.nq + engine.nu + 1)
             run.later = engine.pointer(later_state)
-            self.kept.append(later_state)
+            self.keep_alive.append(later_state)
         run.probe_values = engine.pointer(numbers)
         table = ffi.new("mstmm_event_action[]", max(1, len(actions)))
         for record, (action, release) in zip(table, actions, strict=False):
             record.action, record.release = action, release
-        for bounce in engine.packed.watched.bounces:
+        for bounce in engine.packed.event_functions.bounces:
             self._set_bounce(table[bounce.event], bounce)
         run.events, run.n_events = table, len(actions)
-        run.closes = int(engine.packed.system.closes and _reads_state(engine.packed.scene))
-        run.n_switches = min(len(self.switches), MOST)
-        self.kept += [records, numbers, table, bounds, read]
+        run.closes = int(engine.packed.system.has_loops and _reads_state(engine.packed.scene))
+        run.n_switches = min(len(self.switches), MAX_SWITCHES)
+        self.keep_alive += [records, numbers, table, bounds, read]
 
     def _set_bounce(self, record: Any, bounce: Bounce) -> None:
         engine, ffi = self.engine, self.engine.ffi
         resize_workspace(engine.packed, bounce.slopes.slots)
         indices = np.array([bounce.places], dtype=np.int32).reshape(-1)
         numbers = np.zeros(1 + len(bounce.places) + 4 * engine.nu)
-        record.slopes = c_tape(ffi, bounce.slopes, self.kept)
+        record.slopes = c_tape(ffi, bounce.slopes, self.keep_alive)
         record.n_slopes, record.places = len(bounce.places), ffi.from_buffer("int[]", indices)
         record.restitution, record.numbers = bounce.restitution, engine.pointer(numbers)
-        self.kept += [indices, numbers]
+        self.keep_alive += [indices, numbers]
 
     @property
-    def with_power(self) -> bool:
+    def has_power(self) -> bool:
         """True if the last state component is the work of non-conservative loads."""
         return bool(self.run.with_power)
 
@@ -203,16 +203,16 @@ class SceneSystem:
         cannot be evaluated.
         """
         y, packed = self.start(t, q, u), self.engine.packed
-        if packed.system.strained >= 0:
+        if packed.system.strain_index >= 0:
             is_nearly_singular = self.run.strain > packed.model.loops_strain
-            self.memory[packed.system.strained] = is_nearly_singular
+            self.memory[packed.system.strain_index] = is_nearly_singular
         lib = self.engine.lib
         if lib.mstmm_controllers_act(self.run, t, self.engine.pointer(y)) > 0:
             raise NumericalFailure(self.engine.failure_text(self.run.failure, t))
         check_contact_start(self, t, y)
         return y
 
-    def watched(self, t: float, y: Array) -> Array | None:
+    def event_values(self, t: float, y: Array) -> Array | None:
         """Values of events (>= 0 where they hold), followed by the margins of switches.
 
         None where they cannot be evaluated.
@@ -225,7 +225,7 @@ class SceneSystem:
         failed = calls.events(calls.context, t, pointer(state), pointer(values))
         return None if failed else values
 
-    def meeting(self, event: int, t: float, y: Array, u: Array) -> Any:
+    def approach_rate(self, event: int, t: float, y: Array, u: Array) -> Any:
         """Rate of change of the value of a bounce event, as `mstmm_meeting`, at speeds u (nu,).
 
         Raises NumericalFailure where it cannot be evaluated.
@@ -243,7 +243,7 @@ class SceneSystem:
         does not close near the state.
         """
         y = np.concatenate(
-            [np.asarray(q, float), np.asarray(u, float), np.zeros(int(self.with_power))]
+            [np.asarray(q, float), np.asarray(u, float), np.zeros(int(self.has_power))]
         )
         y = np.ascontiguousarray(y)
         packed, run = self.engine.packed, self.run
@@ -252,14 +252,14 @@ class SceneSystem:
         run.failure.reason = 0  # may be set by an earlier state
         run.on_positions = 0  # a start satisfies the loops at speed level with every method
         self.engine.lib.mstmm_scene_settle(run, t, self.engine.pointer(y))
-        run.on_positions = self.on_positions
+        run.on_positions = self.uses_position_level
         if run.failure.reason in (FailureCode.LOOP, FailureCode.COUPLING, FailureCode.FLAT):
             raise SceneError(f"scene: {self.engine.failure_text(self.run.failure, t)}")
         return y
 
     def components(self) -> StateNames:
         """Names of the state components."""
-        return StateNames(self.engine.packed.layout, self.with_power)
+        return StateNames(self.engine.packed.layout, self.has_power)
 
 
 def _components_read(tape: Tape) -> list[int]:
@@ -300,7 +300,7 @@ def _event_actions(engine: LoopedEngine) -> tuple[list[tuple[int, int]], list[st
         if event.do == "bounce":
             memory_index, bounce_index = bounce_index, bounce_index + 1
         actions.append((action, memory_index))
-        names.append(packed.scene.happening(number))
+        names.append(packed.scene.event_label(number))
     for hinge in packed.scene.hinge:
         if hinge.release is not None:
             actions.append((lib.MSTMM_FIRE_RESTART, packed.releases[hinge.name]))

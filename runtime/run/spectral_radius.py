@@ -87,7 +87,7 @@ class FastestMode:
 
     def __init__(self, engine: LoopedEngine, memory: Array) -> None:
         self.engine, self.memory = engine, memory
-        inertia = engine.inertia_alone
+        inertia = engine.inertia_only
         self._full, self._inertia = TangentMatrix(engine, memory), TangentMatrix(inertia, memory)
         self._kinematics = TangentMatrix(inertia, memory)  # `rates` overwrites a tangent's state
         packed = engine.packed

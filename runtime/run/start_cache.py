@@ -54,13 +54,13 @@ class StartCache:
         tableau = initial_method(system, settings)
         system.memory[:] = engine.start_memory()
         start = system.begin(settings.t_start, q, u)
-        run.begin(tableau, settings, start, tolerances(system, settings, start, self._energy_at))
+        run.start(tableau, settings, start, tolerances(system, settings, start, self._energy_at))
         return system, run
 
     @staticmethod
     def _is_reusable(system: SceneSystem, compiled: SceneCode | None, settings: Settings) -> bool:
-        same_level = system.on_positions == uses_position_constraints(settings)
-        return system.goes_by(compiled) and same_level
+        same_level = system.uses_position_level == uses_position_constraints(settings)
+        return system.uses_code(compiled) and same_level
 
     def _energy_at(self, system: SceneSystem, t: float, start: Array) -> float:
         """Energy of the start in J, computed once for runs from the same start."""

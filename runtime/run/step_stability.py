@@ -87,10 +87,10 @@ class StepCheck:
             f"stability limit {self.stable_step * self.rate:.3g} of the method",
             f"use a step below {_STEP_MARGIN * self.stable_step:.2g} s, or leave step out for a "
             "method that chooses it",
-            self.product, self.stable_step * self.rate, before=self.time is None,
+            self.product, self.stable_step * self.rate, seen_before_run=self.time is None,
         )  # fmt: skip
 
-    def blamed(self, message: str) -> str:
+    def explain_failure(self, message: str) -> str:
         """Message of a failed run, preceded by the risk of the step where that is too long.
 
         The failure itself is then an effect of the step, not of the scene.

@@ -76,7 +76,7 @@ def stop_message(system: SceneSystem, run: Integrator) -> str:
 
 def rest_note(system: SceneSystem, event: int) -> str:
     """Ending of the message of a run that accumulating bounces of an event stopped, else ""."""
-    if all(bounce.event != event for bounce in system.engine.packed.watched.bounces):
+    if all(bounce.event != event for bounce in system.engine.packed.event_functions.bounces):
         return ""
     return (
         ": its bounces accumulate and have come to rest on the contact; to continue the run at "
@@ -148,12 +148,12 @@ def _indefinite_mass_note(system: SceneSystem, y: Array) -> str:
 
 def _indefinite_bodies(packed: PackedScene, q: Array) -> list[str]:
     """Names of the flexible bodies whose mass matrix is not positive definite at q (nq,)."""
-    expanded, supports = packed.expanded, Supports(packed.described)
+    expanded, supports = packed.expanded, Supports(packed.user_scene)
     return [
         name
         for name, body in packed.flexible.items()
         if expanded is not None and not body.points and not is_definite_at(
-            body, body.ports[expanded.held[name]], supports.of(name),
+            body, body.ports[expanded.inboard_ends[name]], supports.support_of(name),
             q[packed.layout.modal[name].q_slice][None],
         )
     ]  # fmt: skip
@@ -190,7 +190,8 @@ def _switch_note(system: SceneSystem, run: Integrator) -> str:
     if not len(crossed):
         return ""
     return (
-        f"; {system.switches[int(crossed[0])].what} switches there: if the motion stays at the "
+        f"; {system.switches[int(crossed[0])].description} switches there: if the motion stays "
+        f"at the "
         "switch, make it smooth, such as tanh(u/0.001) for sign(u), or use the friction of the "
         "hinge's law"
     )
@@ -198,5 +199,5 @@ def _switch_note(system: SceneSystem, run: Integrator) -> str:
 
 def _switch_margins(system: SceneSystem, t: float, y: Array) -> Array:
     """Margins (n_switches,) of the switches, zero where they switch; ones if not evaluable."""
-    values = system.watched(t, y)
+    values = system.event_values(t, y)
     return np.ones(system.system.n_switches) if values is None else values[system.system.n_events :]

@@ -26,7 +26,7 @@ class ProgressCheck:
     def __init__(self, start: float, end: float) -> None:
         self.end, self._last_time, self._attempts = end, start, 0
 
-    def has_end(self, t: float) -> bool:
+    def can_reach_end(self, t: float) -> bool:
         """True if the run can reach its end; call at every attempted step."""
         self._attempts += 1
         if self._attempts % _CHECK_INTERVAL:
@@ -36,13 +36,14 @@ class ProgressCheck:
 
 
 class Crossings:
-    """Crossings of `n` switches in a run of `span` s; `watched` (n,) excludes chattering ones."""
+    """Crossings of `n` switches in a run of `span` s; `is_watched` (n,) excludes chattering
+    ones."""
 
     def __init__(self, n: int, span: float) -> None:
-        self.n, self.span, self.count, self.here = n, span, 0, 0
+        self.n, self.span, self.count, self.repeat_count = n, span, 0, 0
         self.chatter: tuple[int, float] | None = None
         self._last = np.full(n, -np.inf)
-        self.watched = np.ones(n, dtype=bool)
+        self.is_watched = np.ones(n, dtype=bool)
 
     def is_short(self, time: float) -> bool:
         """True if a time in s is negligible in this run."""
@@ -53,7 +54,7 @@ class Crossings:
         is_repeated = self.is_short(t - self._last[switch])
         self._last[switch] = t
         self.count += 1
-        self.here = self.here + 1 if is_repeated else 0
-        if self.here >= _MAX_CROSSINGS:
-            self.here, self.chatter = 0, (switch, t)
-            self.watched[switch] = False
+        self.repeat_count = self.repeat_count + 1 if is_repeated else 0
+        if self.repeat_count >= _MAX_CROSSINGS:
+            self.repeat_count, self.chatter = 0, (switch, t)
+            self.is_watched[switch] = False

@@ -23,8 +23,8 @@ class Trajectory:
     """States of a run: t (n,), q (n, nq), u (n, nu), memory (n, m), work (n,) in J, event (n,).
 
     q and u hold unit quaternions and exact driven coordinates; `norm_residual` is the largest
-    deviation of a quaternion's length from 1 before normalisation.  `last` is (t, q, u) of the last
-    good state and `start` is (q, u) at t_start; output times may omit both.
+    deviation of a quaternion's length from 1 before normalisation.  `last_state` is (t, q, u) of
+    the last good state and `start` is (q, u) at t_start; output times may omit both.
     """
 
     t: Array
@@ -40,13 +40,15 @@ class Trajectory:
     fail_time: float | None = None
     notes: tuple[str, ...] = field(default=())
     norm_residual: float = 0.0
-    last: tuple[float, Array, Array] | None = None
+    last_state: tuple[float, Array, Array] | None = None
     start: tuple[Array, Array] | None = None
     risks: Iterable[Risk] = ()  # found before and during the run, not from its samples
     methods: tuple[MethodSegment, ...] = ()  # of method "auto"
-    reached: AchievedError | None = None  # of a run with a target error
-    told: bool = True  # whether its risks appear among its warnings
-    before: float = 0.0  # wall time in s of earlier processes; result files do not store it
+    achieved_error: AchievedError | None = None  # of a run with a target error
+    reported_risks: bool = True  # whether its risks appear among its warnings
+    earlier_seconds: float = (
+        0.0  # wall time in s of earlier processes; result files do not store it
+    )
 
     @property
     def first(self) -> tuple[float, Array, Array]:

@@ -163,7 +163,9 @@ def _run(model: Model, method: str) -> Outcome:
     step = STEP if method in FIXED else None
     with ImpatientSignal(PATIENCE) as ctrl_c:
         try:
-            result = model.simulate(T_END, method, step, max_steps=most, certify=method == FIRST)
+            result = model.simulate(
+                T_END, mstmm.methods.Method(method, max_steps=most), step, certify=method == FIRST
+            )
         except KeyboardInterrupt:
             return Outcome(INTERRUPTED)
     if ctrl_c.came or result.status is None:
@@ -182,14 +184,16 @@ def _silent(result: Result, everything: bool) -> str:
     numbers = {"q": result.q, "u": result.u, "t": result.t, "work": result.work}
     if everything:
         numbers |= {"udot": result.udot, "energy": result.energy(), "power": result.power()}
-        for name in result.names():
+        for name in result.quantity_names():
             try:
                 numbers[name] = np.asarray(result.quantity(name).values)
             except MstmmError:
                 continue
     bad = [name for name, values in numbers.items() if not np.isfinite(values).all()]
     said = " ".join(result.warnings)
-    told = result._observed.failures or any(word in said for word in ("finite", "overflow", "nan"))
+    told = result._observations.failures or any(
+        word in said for word in ("finite", "overflow", "nan")
+    )
     if not bad or told:
         return ""
     return bad[0].rsplit(".", 1)[-1]

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 
-from .algebra import to_quaternion
+from .algebra import tilde, to_quaternion
 from .jets import Array
 from .newton_euler import motion, relative
 from .random_scenes import random_hinge, random_law, random_scene, random_state
@@ -102,9 +102,29 @@ def _far_from_singular(tree: Tree, q: Array) -> bool:
 
 
 def torn(tree: Tree, q: Array) -> Array:
-    """How unit speeds tear the loops, six rows a closing hinge."""
-    closing = _closing(tree)
-    return np.array([_gap_speeds(tree, closing, q, column) for column in np.eye(tree.nu)]).T
+    """How unit speeds tear the loops, six rows a closing hinge: velocities of the outboard ends
+    against those that the closing hinges give them, a column a speed."""
+    at = motion(tree, q, np.zeros(tree.nu))
+    v, w = (np.zeros((len(tree.bodies) + 1, 3, tree.nu)) for _ in range(2))
+
+    def given(hinge: Hinge) -> tuple[Array, Array]:
+        """Velocity and angular velocity of the outboard end, by the inboard body and the hinge."""
+        rel = relative(hinge, q, np.zeros(tree.nu))
+        frame, rates = at.A[hinge.parent] @ hinge.Ro, np.zeros((6, tree.nu))
+        rates[:, hinge.u] = rel.B
+        arm = at.A[hinge.parent] @ hinge.ro + frame @ rel.d
+        speed = v[hinge.parent] - tilde(arm) @ w[hinge.parent] + frame @ rates[:3]
+        return speed, w[hinge.parent] + frame @ rates[3:]
+
+    for hinge in (tree.hinges[number] for number in tree.order):
+        speed, w[hinge.child] = given(hinge)
+        v[hinge.child] = speed + tilde(at.A[hinge.child] @ hinge.rp) @ w[hinge.child]
+    found = []
+    for hinge in _closing(tree):
+        speed, spin = given(hinge)
+        own = v[hinge.child] - tilde(at.A[hinge.child] @ hinge.rp) @ w[hinge.child]
+        found += [speed - own, spin - w[hinge.child]]
+    return np.concatenate(found)
 
 
 def _closing(tree: Tree) -> list[Hinge]:
@@ -117,17 +137,3 @@ def consistent(tree: Tree, q: Array, u: Array) -> Array:
         return u
     free = scipy.linalg.null_space(torn(tree, q), rcond=1e-10)
     return np.asarray(free @ (free.T @ u))
-
-
-def _gap_speeds(tree: Tree, closing: list[Hinge], q: Array, u: Array) -> Array:
-    """Velocities of the outboard ends against those that the closing hinges give them."""
-    at, found = motion(tree, q, u), []
-    for hinge in closing:
-        rel = relative(hinge, q, u)
-        frame = at.A[hinge.parent] @ hinge.Ro
-        arm = frame @ rel.d
-        speed = at.velocity(hinge.parent, hinge.ro) + np.cross(at.w[hinge.parent], arm)
-        speed = speed + frame @ rel.rates[:3] - at.velocity(hinge.child, hinge.rp)
-        spin = at.w[hinge.parent] + frame @ rel.rates[3:] - at.w[hinge.child]
-        found += [speed, spin]
-    return np.concatenate(found)

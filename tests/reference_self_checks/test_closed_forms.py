@@ -6,12 +6,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from reference import closed_forms as known
-from reference import dae
-from reference import newton_euler as dense
-from reference.algebra import quaternion_matrix, to_quaternion, turn
-from reference.histories import integrate
-from reference.jets import Array, as_jet
+
+from tests.reference import closed_forms as known
+from tests.reference import dae
+from tests.reference import newton_euler as dense
+from tests.reference.algebra import quaternion_matrix, to_quaternion, turn
+from tests.reference.histories import integrate
+from tests.reference.jets import Array, as_jet
 
 
 def end_of(

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from pathlib import Path
 
-TESTS = Path(__file__).parents[1]
+from tests.support.paths import ROOT, TESTS
 
 
 def test_references_run_without_the_engine() -> None:
     """Every reference, imported and used in a fresh interpreter, leaves mstmm unloaded."""
     names = sorted(path.stem for path in (TESTS / "reference").glob("*.py"))
-    imports = "".join(f"import reference.{name}\n" for name in names if name != "__init__")
+    imports = "".join(f"import tests.reference.{name}\n" for name in names if name != "__init__")
     use = (
         "import sys\n"
-        "from reference import dae, newton_euler as dense\n"
-        "from reference.compare import drawn\n"
+        "from tests.reference import dae, newton_euler as dense\n"
+        "from tests.reference.compare import drawn\n"
         "scene, q, u = drawn(1)\n"
         "dense.solve(scene, q, u)\n"
         "equations = dae.Equations(scene)\n"
@@ -25,10 +24,6 @@ def test_references_run_without_the_engine() -> None:
         "assert not loaded, loaded\n"
     )
     run = subprocess.run(
-        [sys.executable, "-c", imports + use],
-        cwd=TESTS,
-        capture_output=True,
-        text=True,
-        check=False,
+        [sys.executable, "-c", imports + use], cwd=ROOT, capture_output=True, text=True, check=False
     )
     assert run.returncode == 0, run.stderr

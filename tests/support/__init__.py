@@ -1,1 +1,1 @@
-"""What several test files use: compiling C text and drawing random kernels."""
+"""Helpers that several test files use, by topic."""

@@ -31,9 +31,7 @@ def derivation(statement: BodyStatement) -> Derivation:
     motion = _motion_symbols(space, modes, letters)
     body_equations = equations_of_motion(body.moments, motion, _elastic_forces(body, motion))
     n = space.length(modes)
-    outputs = [
-        Quantity(sp.MatrixSymbol("U", n, n), space.state(modes).unit, "matrix, z_O = U z_I"),
-    ]
+    outputs = [Quantity(sp.MatrixSymbol("U", n, n), space.state(modes).unit, "matrix, z_O = U z_I")]
     if modes:
         outputs.append(Quantity(sp.MatrixSymbol("W", modes, n), "N", "modal rows, W z_I = 0"))
     return Derivation(
@@ -70,16 +68,16 @@ _NOTES = (
 def _motion_symbols(space: Space, modes: int, letters: SymbolTable) -> Motion:
     def three(name: str, size: int, offset: int) -> sp.Matrix:
         return sp.Matrix(
-            [*[0] * offset, *letters.of(vector(name, size)), *[0] * (3 - offset - size)]
+            [*[0] * offset, *letters.entries_of(vector(name, size)), *[0] * (3 - offset - size)]
         )
 
     def modal(name: str) -> sp.Matrix:
-        return letters.of(vector(name, modes)) if modes else sp.zeros(0, 1)
+        return letters.entries_of(vector(name, modes)) if modes else sp.zeros(0, 1)
 
-    turning = 3 - space.turns
+    turning = 3 - space.rotation_count
     return Motion(
-        three("a", space.shifts, 0), three("w", space.turns, turning),
-        three("wd", space.turns, turning), modal(ETA), modal("etad"), modal("etadd"),
+        three("a", space.translation_count, 0), three("w", space.rotation_count, turning),
+        three("wd", space.rotation_count, turning), modal(ETA), modal("etad"), modal("etadd"),
     )  # fmt: skip
 
 
@@ -91,9 +89,9 @@ def _elastic_forces(body: BodyMoments, motion: Motion) -> sp.Matrix:
 
 def _kinematic_equations(space: Space, modes: int) -> tuple[Equation, ...]:
     """Motion at the predictor, in frame axes."""
-    rotation = sp.MatrixSymbol("R", space.shifts, space.shifts)
+    rotation = sp.MatrixSymbol("R", space.translation_count, space.translation_count)
     equations_ = [Equation("frame axes at the predictor", rotation, _frame_axes(space))]
-    w, wd = vector("w", space.turns), vector("wd", space.turns)
+    w, wd = vector("w", space.rotation_count), vector("wd", space.rotation_count)
     if space.planar:
         theta = vector("theta_p", 1)
         equations_ += [
@@ -105,7 +103,7 @@ def _kinematic_equations(space: Space, modes: int) -> tuple[Equation, ...]:
             Equation("angular velocity", w, vector("D_w", 3)),
             Equation("angular acceleration", wd, vector("B_w", 3)),
         ]
-    size = space.shifts
+    size = space.translation_count
     specific_acceleration = A * vector("r_p", size) + vector("B_r", size) - vector("g", size)
     equations_.append(
         Equation(
@@ -141,37 +139,44 @@ def _linearised_equations(
     rotation_rows, axes = sp.eye(size), sp.eye(size)
     if not space.planar:
         rotation_rows[3:6, 3:6] = TANGENT_OPERATOR.as_explicit()
-    rotation = sp.MatrixSymbol("R", space.shifts, space.shifts).as_explicit()
-    axes[: space.shifts, : space.shifts] = rotation
+    rotation = sp.MatrixSymbol("R", space.translation_count, space.translation_count).as_explicit()
+    axes[: space.translation_count, : space.translation_count] = rotation
     if not space.planar:
         axes[3:6, 3:6] = rotation
     x, t = sp.MatrixSymbol("X", size, size), Matrix(rotation_rows)
     dynamic = A * mass + C * rates
     return (
-        Equation("residual, frame axes", rows, letters.back(solved.rows)),
-        Equation("mass matrix", mass, letters.back(solved.mass), "", "d F_b / d ydd"),
-        Equation("by the speeds", rates, letters.back(solved.rates), "", "d F_b / d yd"),
+        Equation("residual, frame axes", rows, letters.to_matrix_entries(solved.rows)),
+        Equation("mass matrix", mass, letters.to_matrix_entries(solved.mass), "", "d F_b / d ydd"),
         Equation(
-            "by the coordinates", shape, _coordinate_derivative(space, modes, solved, letters),
-            "", "d F_b / d y; the frame's turn moves a and the rows themselves",
+            "by the speeds", rates, letters.to_matrix_entries(solved.rates), "", "d F_b / d yd"
+        ),
+        Equation(
+            "by the coordinates",
+            shape,
+            _coordinate_derivative(space, modes, solved, letters),
+            "",
+            "d F_b / d y; the rotation of the frame changes a and the rows themselves",
         ),
         Equation("frame axes of rows and columns", x, Matrix(axes)),
         Equation(
-            "one Newton step", impedance,
+            "one Newton step",
+            impedance,
             x * ((dynamic * t if not space.planar else dynamic) + shape) * x.T,
-            "", "Z = A M + C dR/dyd + dR/dy, inertial axes",
+            "",
+            "Z = A M + C dR/dyd + dR/dy, inertial axes",
         ),
         Equation(
             "residual at the predictor", vector("F", size), x * rows - _external_loads(space, modes)
         ),
-    )  # fmt: skip
+    )
 
 
 def _coordinate_derivative(
     space: Space, modes: int, solved: Equations, letters: SymbolTable
 ) -> Matrix:
     """Derivative columns of r (zero), of the frame's rotation, and of eta."""
-    size, shifts, turns = space.rigid + modes, space.shifts, space.turns
+    size, shifts, turns = space.rigid + modes, space.translation_count, space.rotation_count
     a, mass, rows = vector("a", shifts), sp.MatrixSymbol("M", size, size), vector("F_b", size)
     by_a = Matrix(size, shifts, lambda i, j: mass[i, j])
     force = Matrix(shifts, 1, lambda i, _: rows[i, 0])
@@ -185,11 +190,11 @@ def _coordinate_derivative(
     columns = [
         sp.zeros(size, shifts),
         sp.Matrix(acceleration_part) + rotation_part,
-        letters.back(solved.shape),
+        letters.to_matrix_entries(solved.shape),
     ]
     return Matrix(sp.Matrix.hstack(*(c for c in columns if c.cols)))
 
 
 def _external_loads(space: Space, modes: int) -> Matrix:
-    blocks = [("f_r", space.shifts), ("f_m", space.turns), ("f_eta", modes)]
+    blocks = [("f_r", space.translation_count), ("f_m", space.rotation_count), ("f_eta", modes)]
     return Matrix([vector(name, k)[i, 0] for name, k in blocks if k for i in range(k)])

@@ -45,7 +45,9 @@ def _end_inputs(statement: BodyStatement) -> tuple[Quantity, ...]:
             Quantity(sp.MatrixSymbol("Theta_O", 1, modes), "1/m", "slopes at the output end"),
             Quantity(sp.MatrixSymbol("Theta_I", 1, modes), "1/m", "slopes at the input end"),
         )
-    inputs = [Quantity(vector("r_e", space.shifts), "m", "output end at rest, frame axes")]
+    inputs = [
+        Quantity(vector("r_e", space.translation_count), "m", "output end at rest, frame axes")
+    ]
     if modes:
         rotation_note = (
             ""
@@ -53,21 +55,25 @@ def _end_inputs(statement: BodyStatement) -> tuple[Quantity, ...]:
             else " (rate of its rotation at the predictor: T(Psi) Theta of a rotation vector Psi)"
         )
         inputs += [
-            Quantity(sp.MatrixSymbol("Phi_O", space.shifts, modes), "1", "shapes, output end"),
             Quantity(
-                sp.MatrixSymbol("Theta_O", space.turns, modes), "1/m",
+                sp.MatrixSymbol("Phi_O", space.translation_count, modes), "1", "shapes, output end"
+            ),
+            Quantity(
+                sp.MatrixSymbol("Theta_O", space.rotation_count, modes),
+                "1/m",
                 "section rotation per mode at the output end" + rotation_note,
             ),
             Quantity(
-                sp.MatrixSymbol("Theta_I", space.turns, modes), "1/m",
+                sp.MatrixSymbol("Theta_I", space.rotation_count, modes),
+                "1/m",
                 "section rotation per mode at the input end" + rotation_note,
             ),
-        ]  # fmt: skip
+        ]
     return tuple(inputs)
 
 
 def _map_inputs(space: Space, modes: int) -> tuple[Quantity, ...]:
-    shifts, turns = space.shifts, space.turns
+    shifts, turns = space.translation_count, space.rotation_count
     inputs = [
         Quantity(MAP_A, "1/s2", "time map, ydd = A y + B"),
         Quantity(MAP_C, "1/s", "time map, yd = C y + D"),

@@ -45,16 +45,16 @@ class Pairing:
         """State at its output end: coordinates of the outboard body."""
         return self.space.state(self.outboard)
 
-    def at_input(self, name: str) -> sp.MatrixSymbol:
+    def input_block(self, name: str) -> sp.MatrixSymbol:
         """Block of the state at the input end."""
         return _block(self.state_in, name, "I")
 
-    def at_output(self, name: str) -> sp.MatrixSymbol:
+    def output_block(self, name: str) -> sp.MatrixSymbol:
         """Block of the state at the output end."""
         return _block(self.state_out, name, "O")
 
     @property
-    def shown(self) -> str:
+    def description(self) -> str:
         """Description of the pairing."""
         kinds = ["a flexible body" if n else "a rigid body" for n in (self.inboard, self.outboard)]
         return f"{kinds[0]} inboard, {kinds[1]} outboard"
@@ -111,7 +111,7 @@ def derivation(hinge: FlexibleHinge) -> Derivation:
         definitions=(*hinge.definitions, *_elimination_equations(hinge)),
         premises=(*hinge.premises, *_vibration_premise(hinge), *hinge.conditions),
         sources=(f"{BOOK}, {hinge.source}",),
-        notes=(f"{pair.shown.capitalize()}. {_STATE_NOTE}", *hinge.notes),
+        notes=(f"{pair.description.capitalize()}. {_STATE_NOTE}", *hinge.notes),
     )
 
 
@@ -139,7 +139,7 @@ def _vibration_premise(hinge: FlexibleHinge) -> tuple[Equation, ...]:
     if not pair.outboard:
         return ()
     n = pair.state_out.length
-    blocks = [[symbol] for symbol in pair.state_out.at("O")]
+    blocks = [[symbol] for symbol in pair.state_out.end_blocks("O")]
     state = sp.BlockMatrix([*blocks, [Matrix([[1]])]])
     rows = sp.MatrixSymbol("W", pair.outboard, n)
     return (
@@ -158,10 +158,7 @@ def _elimination_equations(hinge: FlexibleHinge) -> tuple[Equation, ...]:
     if not free.cols:
         return (Equation("transfer matrix", transfer_symbol, carry, hinge.equation),)
     e, g = sp.MatrixSymbol("E", n_out, n_in), sp.MatrixSymbol("G", n_out, free.cols)
-    rows, gain = (
-        sp.MatrixSymbol("V", free.cols, n_out),
-        sp.MatrixSymbol("K", free.cols, n_in),
-    )
+    rows, gain = (sp.MatrixSymbol("V", free.cols, n_out), sp.MatrixSymbol("K", free.cols, n_in))
     return (
         Equation("carried state", e, carry, "", "z_O at x = 0"),
         Equation("free unknowns", g, free, "", "d z_O / d x, x = [own freedom; eta_O]"),
@@ -184,15 +181,15 @@ def _condition_rows(hinge: FlexibleHinge) -> sp.Basic:
 def elimination_matrices(hinge: FlexibleHinge) -> tuple[Matrix, Matrix]:
     """E and G of z_O = E z_I + G x, solved from the relations."""
     pair = hinge.pairing
-    unknowns: Sequence[sp.MatrixSymbol] = pair.state_out.at("O")
+    unknowns: Sequence[sp.MatrixSymbol] = pair.state_out.end_blocks("O")
     free_unknowns = (hinge.free,) if hinge.free is not None else ()
     inner = pair.state_in.length - 1
     relations = hinge.relations
     if pair.outboard:
         coordinates = vector("x_eta", pair.outboard)
-        relations = (*relations, Equation("", pair.at_output("eta"), coordinates))
+        relations = (*relations, Equation("", pair.output_block("eta"), coordinates))
         free_unknowns = (*free_unknowns, coordinates)
-    rows = solve_linear(relations, unknowns, (*pair.state_in.at("I"), *free_unknowns))
+    rows = solve_linear(relations, unknowns, (*pair.state_in.end_blocks("I"), *free_unknowns))
     count = sum(int(symbol.rows) for symbol in free_unknowns)
     carried_state = rows[:, :inner].row_join(rows[:, inner + count :])
     free_columns = rows[:, inner : inner + count]

@@ -28,7 +28,7 @@ class SymbolTable:
     def __init__(self) -> None:
         self._entries: dict[sp.Basic, sp.Basic] = {}
 
-    def of(self, symbol: sp.MatrixSymbol) -> sp.Matrix:
+    def entries_of(self, symbol: sp.MatrixSymbol) -> sp.Matrix:
         """Matrix of plain symbols that represents a matrix symbol."""
         symbols = sp.Matrix(
             *symbol.shape, lambda i, j: sp.Symbol(f"{symbol.name}__{i}_{j}", real=True)
@@ -36,7 +36,7 @@ class SymbolTable:
         self._entries |= dict(zip(symbols, symbol.as_explicit(), strict=True))
         return symbols
 
-    def back(self, matrix: sp.MatrixBase) -> Matrix:
+    def to_matrix_entries(self, matrix: sp.MatrixBase) -> Matrix:
         """Matrix in terms of entries of matrix symbols."""
         return Matrix(matrix.xreplace(self._entries))
 
@@ -81,10 +81,10 @@ def planar_moments(modes: int, letters: SymbolTable, kind: str) -> BodyMoments:
         Quantity(inertia, "kg*m2", "moment of inertia at rest about the input end"),
     ]
     inputs += _planar_shapes(modes, kind)
-    symbols = {q.name: letters.of(q.symbol) for q in inputs}
+    symbols = {q.name: letters.entries_of(q.symbol) for q in inputs}
     c, j = vector("c", 2), sp.MatrixSymbol("J", 1, 1)
     if not modes:
-        defined_symbols, c_symbols, j_symbols = (c, j), letters.of(c), letters.of(j)
+        defined_symbols, c_symbols, j_symbols = (c, j), letters.entries_of(c), letters.entries_of(j)
         values = (symbols["S_0"], symbols["I_0"])
         moments = _embed_planar_moments(
             symbols["m"], c_symbols, j_symbols, sp.zeros(2, 0), sp.zeros(1, 0), sp.zeros(0, 0), {}
@@ -127,13 +127,13 @@ def _planar_body_moments(
     shape_data: tuple[tuple[Quantity, ...], dict[str, sp.Matrix]],
 ) -> BodyMoments:
     inputs, symbols = shape_data
-    eta = letters.of(vector(ETA, modes))
+    eta = letters.entries_of(vector(ETA, modes))
     shift, radial_product, cross_product = _planar_invariants(modes, kind, symbols)
     gram = symbols["M_f"]
     gram = sp.Matrix(modes, modes, lambda i, j: gram[min(i, j), max(i, j)])
     c, j = vector("c", 2), sp.MatrixSymbol("J", 1, 1)
     slope, spin = sp.MatrixSymbol("J_e", 1, modes), sp.MatrixSymbol("G", 1, modes)
-    defined = [letters.of(s) for s in (c, j, slope, spin)]
+    defined = [letters.entries_of(s) for s in (c, j, slope, spin)]
     values = (
         symbols["S_0"] + shift * eta,
         symbols["I_0"] + 2 * radial_product.T * eta + eta.T * gram * eta,
@@ -206,8 +206,8 @@ def spatial_moments(modes: int, letters: SymbolTable, kind: str, planes: str = "
         symmetric_quantity("J_0", 3, "kg*m2", "inertia at rest about the input end, frame axes"),
         *_spatial_shapes(modes, kind),
     ]
-    symbols = {q.name: letters.of(q.symbol) for q in inputs}
-    eta = letters.of(vector(ETA, modes)) if modes else sp.zeros(0, 1)
+    symbols = {q.name: letters.entries_of(q.symbol) for q in inputs}
+    eta = letters.entries_of(vector(ETA, modes)) if modes else sp.zeros(0, 1)
     products = _shape_products(modes, kind, symbols, planes)
     return _spatial_body_moments(letters, tuple(inputs), symbols, eta, products)
 
@@ -302,7 +302,7 @@ def _spatial_body_moments(
         for j_ in range(modes):
             values[1] = values[1] + eta[k] * eta[j_] * inertia_products[k, j_] / 2
     if not modes:
-        defined = [letters.of(s) for s in defined_symbols]
+        defined = [letters.entries_of(s) for s in defined_symbols]
         no_columns = sp.zeros(3, 0)
         moments = Moments(
             known["m"][0],
@@ -349,7 +349,7 @@ def _assemble_spatial_moments(
     products, inertia_products, axial_products = parts
     defined_symbols, values = named
     modes = products.shift.cols
-    defined = [letters.of(s) for s in defined_symbols]
+    defined = [letters.entries_of(s) for s in defined_symbols]
     gradient: dict[sp.Symbol, Sequence[sp.Expr]] = {
         defined[0][i]: list(products.shift.row(i)) for i in range(3)
     }
@@ -409,6 +409,6 @@ def _definition_equations(
     names: Sequence[str],
 ) -> tuple[Equation, ...]:
     return tuple(
-        Equation(name, symbol, letters.back(value))
+        Equation(name, symbol, letters.to_matrix_entries(value))
         for symbol, value, name in zip(symbols, values, names, strict=False)
     )

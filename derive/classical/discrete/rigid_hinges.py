@@ -21,7 +21,7 @@ SECTION_MEANING = "section rotation per mode at the {} side of the hinge"
 def section_rotation(pair: Pairing, end: str) -> sp.MatrixExpr:
     """Rotation of the section at the end I or O of the hinge."""
     block_at, modes = (
-        (pair.at_input, pair.inboard) if end == "I" else (pair.at_output, pair.outboard)
+        (pair.input_block, pair.inboard) if end == "I" else (pair.output_block, pair.outboard)
     )
     angle = block_at(pair.space.angle)
     if not modes:
@@ -35,7 +35,7 @@ def section_rotation(pair: Pairing, end: str) -> sp.MatrixExpr:
 def section_slopes(space: Space, modes: int, end: str) -> sp.MatrixSymbol:
     """Section rotation per mode at the end I or O of the hinge."""
     name = "Theta" if space.planar else "S"
-    return sp.MatrixSymbol(f"{name}_{end}", space.turns, modes)
+    return sp.MatrixSymbol(f"{name}_{end}", space.rotation_count, modes)
 
 
 def section_inputs(pair: Pairing) -> tuple[Quantity, ...]:
@@ -55,9 +55,9 @@ def section_inputs(pair: Pairing) -> tuple[Quantity, ...]:
 
 def _transmission_equations(pair: Pairing) -> tuple[Equation, ...]:
     return (
-        Equation("one point", pair.at_output("r"), pair.at_input("r")),
-        Equation("moment transmitted", pair.at_output("m"), pair.at_input("m")),
-        Equation("force transmitted", pair.at_output("q"), pair.at_input("q")),
+        Equation("one point", pair.output_block("r"), pair.input_block("r")),
+        Equation("moment transmitted", pair.output_block("m"), pair.input_block("m")),
+        Equation("force transmitted", pair.output_block("q"), pair.input_block("q")),
     )
 
 
@@ -65,7 +65,7 @@ def fixed_hinge(
     pair: Pairing, element: str, source: str, equation: str, number: str = ""
 ) -> Derivation:
     """A weld: common point, constant relative orientation."""
-    turns = pair.space.turns
+    turns = pair.space.rotation_count
     name = "gamma" if pair.space.planar else "beta"
     meaning = (
         "angle of the outboard from the inboard section"
@@ -100,10 +100,10 @@ def smooth_hinge(
     pair: Pairing, element: str, source: str, equation: str, number: str = ""
 ) -> Derivation:
     """Planar pin, or ball: the rotation is free, the next hinge's moment is given."""
-    turns = pair.space.turns
+    turns = pair.space.rotation_count
     effort, angle = vector("tau_n", turns), pair.space.angle
     free = vector("x_turn", turns)
-    free_rotation = Equation("free rotation", pair.at_output(angle), free, "", "an unknown")
+    free_rotation = Equation("free rotation", pair.output_block(angle), free, "", "an unknown")
     title = "smooth pin (planar)" if pair.space.planar else "smooth ball"
     state = pair.state_out
     moment_start = state.sizes[0] + state.sizes[1]
@@ -148,7 +148,7 @@ def pin_hinge(
     """Pin in space: one free angle; the next pin's axis rotates with its section."""
     axis, free = vector("a", 3), vector("x_turn", 1)
     rotation_equation = Equation(
-        "rotation about the axis alone", section_rotation(pair, "O"),
+        "rotation about the axis only", section_rotation(pair, "O"),
         section_rotation(pair, "I") + axis * free + vector("beta", 3),
     )  # fmt: skip
     inputs, condition, rows = _next_pin_condition(pair, number)
@@ -175,7 +175,7 @@ def pin_hinge(
             conditions=(condition,),
             notes=(
                 _NEXT_HINGE_NOTE,
-                "The condition is that of the next axis as it turns with its section, "
+                "The condition is that of the next axis as it rotates with its section, "
                 "a_n + s x a_n, to first order.",
             ),
         )

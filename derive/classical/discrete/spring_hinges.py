@@ -27,8 +27,8 @@ def planar_spring(pair: Pairing, element: str, source: str, equation: str) -> De
     """
     d_s, q_s = vector("d_s", 2), vector("q_s", 2)
     turn = section_rotation(pair, "I") - vector("theta_s", 1)
-    r_i, m_i, q_i = (pair.at_input(name) for name in "rmq")
-    r_o, m_o, q_o = (pair.at_output(name) for name in "rmq")
+    r_i, m_i, q_i = (pair.input_block(name) for name in "rmq")
+    r_o, m_o, q_o = (pair.output_block(name) for name in "rmq")
     elongation_change = r_o - r_i - d_s
     angle = section_rotation(pair, "O") - section_rotation(pair, "I")
     impedance = _impedance("t", 2)
@@ -75,7 +75,7 @@ def planar_spring(pair: Pairing, element: str, source: str, equation: str) -> De
 
 _NOTES = (
     "Where the springs carry nothing and have no length at the predictor (q_s = 0, d_s = 0) this "
-    "is the relation of the book, which leaves out d x q and the turning of the springs.",
+    "is the relation of the book, which neglects d x q and the rotation of the springs.",
 )
 
 
@@ -115,7 +115,7 @@ def _planar_law_equations() -> tuple[Equation, ...]:
     slope = -moment[0, 0].xreplace({predicted[0, 0]: angle}).diff(angle)
     return (
         Equation("moment of the torsion spring", vector("m_s", 1), moment, "(8.108)"),
-        Equation("its slope", sp.MatrixSymbol("Z_r", 1, 1),
+        Equation("its derivative", sp.MatrixSymbol("Z_r", 1, 1),
                  Matrix([slope.xreplace({angle: predicted[0, 0]})]), "(8.110)"),
         Equation("impedance of the springs", sp.MatrixSymbol("Z_t", 2, 2), _impedance("t", 2)),
     )  # fmt: skip
@@ -135,8 +135,8 @@ def spatial_spring(pair: Pairing, element: str, source: str, equation: str) -> D
     """Linear and torsional springs with any tangent, linearised at the predictor."""
     d_s, q_s, m_s = vector("d_s", 3), vector("q_s", 3), vector("m_s", 3)
     turn, outboard_rotation = section_rotation(pair, "I"), section_rotation(pair, "O")
-    r_i, m_i, q_i = (pair.at_input(name) for name in "rmq")
-    r_o, m_o, q_o = (pair.at_output(name) for name in "rmq")
+    r_i, m_i, q_i = (pair.input_block(name) for name in "rmq")
+    r_o, m_o, q_o = (pair.output_block(name) for name in "rmq")
     elongation_change = r_o - r_i - d_s
     impedance, stiffness = _impedance("t", 3), _impedance("r", 3)
     lever = Equation(
@@ -211,27 +211,32 @@ def _carried_row_equations(pair: Pairing) -> tuple[Equation, ...]:
     """Rows on z_I: rotations of both sections, change of the elongation, moment."""
     space, state = pair.space, pair.state_in
     d_s, q_s, m_s = (
-        vector("d_s", space.shifts),
-        vector("q_s", space.shifts),
-        vector("m_s", space.turns),
+        vector("d_s", space.translation_count),
+        vector("q_s", space.translation_count),
+        vector("m_s", space.rotation_count),
     )
     unit_row = rows_of(state, "1")
     turn, change, moment, outboard_angle = _row_symbols(pair)
-    elastic_force = rows_of(state, "q") - q_s * unit_row - space.turned(q_s, turn)
+    elastic_force = rows_of(state, "q") - q_s * unit_row - space.rotate(q_s, turn)
     elastic_moment = moment - m_s * unit_row
     if not space.planar:
-        elastic_moment = elastic_moment - space.turned(m_s, turn)
+        elastic_moment = elastic_moment - space.rotate(m_s, turn)
     predicted_angle = (
         (vector("theta_s", 1) + vector("phi_s", 1)) * unit_row if space.planar else None
     )
-    outboard_rotation = turn - sp.MatrixSymbol("Y_r", space.turns, space.turns) * elastic_moment
+    outboard_rotation = (
+        turn - sp.MatrixSymbol("Y_r", space.rotation_count, space.rotation_count) * elastic_moment
+    )
     return (
-        Equation("turn of the inboard section", turn, _section_rotation_rows(pair), "", "on z_I"),
+        Equation(
+            "rotation of the inboard section", turn, _section_rotation_rows(pair), "", "on z_I"
+        ),
         Equation(
             "change of the elongation",
             change,
-            space.turned(d_s, turn)
-            - sp.MatrixSymbol("Y_t", space.shifts, space.shifts) * elastic_force,
+            space.rotate(d_s, turn)
+            - sp.MatrixSymbol("Y_t", space.translation_count, space.translation_count)
+            * elastic_force,
         ),
         Equation(
             "moment on the outboard side",
@@ -245,14 +250,19 @@ def _carried_row_equations(pair: Pairing) -> tuple[Equation, ...]:
             outboard_angle,
             outboard_rotation if predicted_angle is None else outboard_rotation + predicted_angle,
             "",
-            "its angle" if space.planar else "its turn",
+            "its angle" if space.planar else "its rotation",
         ),
     )
 
 
 def _row_symbols(pair: Pairing) -> tuple[sp.MatrixSymbol, ...]:
     space, n = pair.space, pair.state_in.length
-    sizes = {"s_z": space.turns, "d_z": space.shifts, "m_z": space.turns, "o_z": space.turns}
+    sizes = {
+        "s_z": space.rotation_count,
+        "d_z": space.translation_count,
+        "m_z": space.rotation_count,
+        "o_z": space.rotation_count,
+    }
     return tuple(sp.MatrixSymbol(name, size, n) for name, size in sizes.items())
 
 
@@ -284,10 +294,10 @@ def _elimination_matrices(pair: Pairing) -> tuple[sp.Basic, Matrix]:
             outboard_rotation = outboard_rotation + slopes * vector("eta_pO", modes) * rows_of(
                 state, "1"
             )
-        free[space.shifts : space.rigid, :] = -slopes.as_explicit()
+        free[space.translation_count : space.rigid, :] = -slopes.as_explicit()
         free[size - 1 - modes : size - 1, :] = sp.eye(modes)
     blocks: list[sp.Basic] = [
-        rows_of(state, "r") + vector("d_s", space.shifts) * rows_of(state, "1") + change,
+        rows_of(state, "r") + vector("d_s", space.translation_count) * rows_of(state, "1") + change,
         outboard_rotation,
         moment,
         rows_of(state, "q"),

@@ -25,20 +25,26 @@ class Space:
     def __init__(self, planar: bool) -> None:
         self.planar = planar
         self.name = "planar" if planar else "spatial"
-        self.shifts, self.turns = (2, 1) if planar else (3, 3)
+        self.translation_count, self.rotation_count = (2, 1) if planar else (3, 3)
         self.angle = "theta" if planar else "psi"
 
     @property
     def rigid(self) -> int:
         """Number of rigid degrees of freedom."""
-        return self.shifts + self.turns
+        return self.translation_count + self.rotation_count
 
     def state(self, modes: int) -> StateVector:
         """State vector of an end of a body with this number of modes."""
         has_modes = bool(modes)
         return StateVector(
             ("r", self.angle, "m", "q", *("eta",) * has_modes),
-            (self.shifts, self.turns, self.turns, self.shifts, *(modes,) * has_modes),
+            (
+                self.translation_count,
+                self.rotation_count,
+                self.rotation_count,
+                self.translation_count,
+                *(modes,) * has_modes,
+            ),
             ("m", "rad", "N*m", "N", *("m",) * has_modes, "1"),
         )
 
@@ -50,7 +56,7 @@ class Space:
         """lever x force, for a column `lever` and the rows `force` of a state (or a column)."""
         return rotate_plane_column(lever).T * force if self.planar else tilde(lever) * force
 
-    def turned(self, column: sp.Basic, angle: sp.Basic) -> sp.Basic:
+    def rotate(self, column: sp.Basic, angle: sp.Basic) -> sp.Basic:
         """angle x column, for the rows `angle` of a small rotation."""
         return rotate_plane_column(column) * angle if self.planar else -tilde(column) * angle
 

@@ -24,7 +24,7 @@ from ...definition.derivation import Derivation, Equation, Quantity, tilde
 from ...definition.element import Body
 from .. import user_body as body_kernels
 from ..block_matrices import part, stack, symbol
-from ..hinge import HingeMotion, HingePlace, hinge_quantities
+from ..hinge import HingeMotion, HingePose, hinge_quantities
 from ..hinge_elimination import REDUCED_E, REDUCED_S, eliminate, with_unit_columns
 from ..riccati_sweep import (
     DELTA,
@@ -34,8 +34,8 @@ from ..riccati_sweep import (
     SOURCES,
     E,
     S,
-    floor_of,
     gains,
+    inertia_floor,
     unit_directions,
 )
 from ..screw_transport import OUT_E, OUT_S, Stage
@@ -43,14 +43,14 @@ from ..screw_transport import OUT_E, OUT_S, Stage
 LINK = Quantity(
     symbol("link", 5), "", "screw about x: cosine, sine, shift (m); angle and shift of z at q = 0"
 )
-TURN = Quantity(symbol("turn", 2), "", "cosine and sine of the angle about z")
+ROTATION = Quantity(symbol("turn", 2), "", "cosine and sine of the angle about z")
 SHIFT = Quantity(symbol("d", 1), "m", "shift along z")
 BODY = Quantity(
     symbol("b", 11), "", "parameters of the rigid body, body axes; rotor inertia of its hinge"
 )
-OWN_LOAD = Quantity(symbol("e_B", 6), "N, N*m", "load that the bias motion of the body needs")
-OUTER_S = Quantity(symbol("S_K", 6, 6), "", "S of what hangs on the body", symmetric=True)
-OUTER_E = Quantity(symbol("e_K", 6), "N, N*m", "e of what hangs on the body")
+OWN_LOAD = Quantity(symbol("e_B", 6), "N, N*m", "load required by the bias motion of the body")
+OUTER_S = Quantity(symbol("S_K", 6, 6), "", "S of the outboard part", symmetric=True)
+OUTER_E = Quantity(symbol("e_K", 6), "N, N*m", "e of the outboard part")
 
 
 def _about_x() -> Stage:
@@ -59,10 +59,10 @@ def _about_x() -> Stage:
 
 
 def _about_z() -> Stage:
-    return Stage(2, TURN.symbol[0, 0], TURN.symbol[1, 0], SHIFT.symbol[0, 0], "_z")
+    return Stage(2, ROTATION.symbol[0, 0], ROTATION.symbol[1, 0], SHIFT.symbol[0, 0], "_z")
 
 
-def along_z(place: HingePlace) -> tuple[sp.Expr, sp.Expr] | None:
+def along_z(place: HingePose) -> tuple[sp.Expr, sp.Expr] | None:
     """Angle and shift as functions of q, for a hinge that moves only about and along z."""
     rotation, position = place.rotation, place.position
     if any(rotation[k, 2] != (k == 2) or rotation[2, k] != (k == 2) for k in range(3)):
@@ -82,9 +82,9 @@ def _angle_and_shift(motion: HingeMotion) -> tuple[sp.Expr, sp.Expr]:
     return angle, shift
 
 
-def turn(motion: HingeMotion) -> Derivation:
+def rotation_derivation(motion: HingeMotion) -> Derivation:
     """Angle about z."""
-    theta = Quantity(symbol("turn", 1), "rad", "angle about z, in place of its cosine and sine")
+    theta = Quantity(symbol("turn", 1), "rad", "angle about z instead of its cosine and sine")
     value = _angle_and_shift(motion)[0] + LINK.symbol[3, 0]
     return Derivation(
         motion.hinge.name,
@@ -103,15 +103,15 @@ def forward(motion: HingeMotion, body: Body) -> Derivation:
     rates = symbol("qdot", motion.rates.rows)
     return Derivation(
         motion.hinge.name,
-        f"bias motion of a rigid body behind the {motion.hinge.title}",
-        (LINK, TURN, BODY, *hinge_quantities(motion.hinge), PARENT_MOTION),
+        f"bias motion of a rigid body outboard of the {motion.hinge.title}",
+        (LINK, ROTATION, BODY, *hinge_quantities(motion.hinge), PARENT_MOTION),
         (SHIFT, MOTION, OWN_LOAD, Quantity(rates, "", "coordinate rates")),
         (
-            *_about_x().behind(PARENT_MOTION.symbol, between),
+            *_about_x().outboard_motion(PARENT_MOTION.symbol, between),
             Equation("shift along z", SHIFT.symbol, sp.ImmutableDenseMatrix([shift + link[4, 0]])),
-            *_about_z().behind(between, motion_q),
+            *_about_z().outboard_motion(between, motion_q),
             Equation("bias motion", MOTION.symbol, body_motion(motion, motion_q)),
-            Equation("load", OWN_LOAD.symbol, of_body(body_kernels.bias_load(body), "e")),
+            Equation("load", OWN_LOAD.symbol, body_entries(body_kernels.bias_load(body), "e")),
             Equation("coordinate rates", rates, motion.in_arrays(motion.rates)),
         ),
         sources=SOURCES,
@@ -127,7 +127,7 @@ def body_motion(motion: HingeMotion, motion_q: sp.MatrixSymbol) -> sp.BlockMatri
     return stack(w + w_own, wd + tilde(w) * w_own + c_w, rdd + 2 * (tilde(w) * v_own) + c_v)
 
 
-def of_body(derivation: Derivation, name: str) -> sp.Basic:
+def body_entries(derivation: Derivation, name: str) -> sp.Basic:
     """Definition from the body's derivation, with its parameters renamed to those here."""
     parameters = next(q for q in derivation.inputs if q.name == "p").symbol
     matrix = sp.ImmutableDenseMatrix(derivation.definition(name))
@@ -147,11 +147,11 @@ def condense(motion: HingeMotion, body: Body, rotor: bool = False) -> Derivation
     gain, offset = gains(nu)
     tau = next(q for q in elimination.inputs if q.name == "tau")
     middle = (symbol("S_x", 6, 6), symbol("e_x", 6))
-    mass = of_body(body_kernels.inertia(body), "S")
+    mass = body_entries(body_kernels.inertia(body), "S")
     return Derivation(
         motion.hinge.name,
         f"S and e of a rigid body carried across the {motion.hinge.title}",
-        (LINK, TURN, SHIFT, BODY, *inputs, OUTER_S, OUTER_E, OWN_LOAD, tau),
+        (LINK, ROTATION, SHIFT, BODY, *inputs, OUTER_S, OUTER_E, OWN_LOAD, tau),
         (gain, offset, OUT_S, OUT_E),
         (
             Equation(
@@ -159,16 +159,16 @@ def condense(motion: HingeMotion, body: Body, rotor: bool = False) -> Derivation
             ),
             Equation("e of body and outboard part", E.symbol, OWN_LOAD.symbol + OUTER_E.symbol),
             *elimination.definitions,
-            *_about_z().carried(REDUCED_S.symbol, REDUCED_E.symbol, middle),
-            *_about_x().carried(*middle, (OUT_S.symbol, OUT_E.symbol)),
+            *_about_z().carry_equations(REDUCED_S.symbol, REDUCED_E.symbol, middle),
+            *_about_x().carry_equations(*middle, (OUT_S.symbol, OUT_E.symbol)),
         ),
         sources=SOURCES,
     )
 
 
-def floor(body: Body) -> sp.ImmutableDenseMatrix:
+def pivot_threshold(body: Body) -> sp.ImmutableDenseMatrix:
     """Lower limit of pivots, from the body's own inertia."""
-    return floor_of(of_body(body_kernels.inertia(body), "S"))
+    return inertia_floor(body_entries(body_kernels.inertia(body), "S"))
 
 
 def recover(motion: HingeMotion, rotor: bool = False) -> Derivation:
@@ -180,8 +180,8 @@ def recover(motion: HingeMotion, rotor: bool = False) -> Derivation:
     full = with_unit_columns(gain.symbol, {} if rotor else unit_directions(subspace))
     return Derivation(
         motion.hinge.name,
-        f"accelerations of a rigid body behind the {motion.hinge.title}",
-        (LINK, TURN, SHIFT, *hinge_quantities(motion.hinge)[:1], gain, offset, PARENT_DELTA),
+        f"accelerations of a rigid body outboard of the {motion.hinge.title}",
+        (LINK, ROTATION, SHIFT, *hinge_quantities(motion.hinge)[:1], gain, offset, PARENT_DELTA),
         (rates, DELTA),
         (
             *_about_x().deviation(PARENT_DELTA.symbol, between),

@@ -20,7 +20,7 @@ from ...definition.derivation import Derivation, Equation, Quantity, Triangular,
 from ...definition.element import Body, Hinge
 from .. import user_body as body_kernels
 from ..block_matrices import part, stack, symbol
-from ..hinge import HingeMotion, hinge_quantities, moves_as, place_of
+from ..hinge import HingeMotion, has_subspace, hinge_pose, hinge_quantities
 from ..hinge_elimination import REDUCED_E
 from ..ldl_elimination import eliminate_factored
 from ..riccati_sweep import (
@@ -38,33 +38,33 @@ from ..riccati_sweep import (
     transport,
 )
 from ..screw_transport import OUT_E, OUT_S
-from .axial import BODY, OUTER_E, OUTER_S, OWN_LOAD, body_motion, of_body
+from .axial import BODY, OUTER_E, OUTER_S, OWN_LOAD, body_entries, body_motion
 
 LINK = Quantity(
     symbol("link", 12), "", "rotation, inboard hinge axes to parent axes; inboard point (m)"
 )
-TURN = Quantity(symbol("turn", 3, 3), "", "rotation, body axes to parent axes")
+ROTATION = Quantity(symbol("turn", 3, 3), "", "rotation, body axes to parent axes")
 #: An axial link has a shift; a rotation about a point has none.
 NO_SHIFT = Quantity(symbol("d", 0), "m", "shift")
 
 
-def turns_about_a_point(hinge: Hinge) -> bool:
+def is_rotational(hinge: Hinge) -> bool:
     """Whether a hinge only rotates and its speeds are the angular velocity in body axes."""
-    if hinge.speeds is None or place_of(hinge).position.is_zero_matrix is not True:
+    if hinge.speeds is None or hinge_pose(hinge).position.is_zero_matrix is not True:
         return False
     turning = sp.Matrix.vstack(sp.zeros(3, 3), sp.eye(3))
-    return moves_as(hinge, turning)
+    return has_subspace(hinge, turning)
 
 
 def _parent_transform() -> tuple[Equation, Equation]:
     """Transformation to the parent, in the names of the sweep's equations."""
     return (
-        Equation("rotation to the parent", R.symbol, TURN.symbol),
+        Equation("rotation to the parent", R.symbol, ROTATION.symbol),
         Equation("lever in the parent", SHIFT.symbol, part(LINK.symbol, 9)),
     )
 
 
-def turn(motion: HingeMotion) -> Derivation:
+def rotation_derivation(motion: HingeMotion) -> Derivation:
     """Rotation to the parent."""
     inboard = sp.ImmutableDenseMatrix(3, 3, lambda i, j: LINK.symbol[3 * i + j, 0])
     value = inboard * motion.in_arrays(motion.rotation)
@@ -72,8 +72,8 @@ def turn(motion: HingeMotion) -> Derivation:
         motion.hinge.name,
         f"rotation of the {motion.hinge.title}",
         (LINK, *hinge_quantities(motion.hinge)[1:2]),
-        (TURN,),
-        (Equation("rotation to the parent", TURN.symbol, value),),
+        (ROTATION,),
+        (Equation("rotation to the parent", ROTATION.symbol, value),),
     )
 
 
@@ -85,20 +85,20 @@ def forward(motion: HingeMotion, body: Body) -> Derivation:
     lever = part(SHIFT.symbol, 0)
     return Derivation(
         motion.hinge.name,
-        f"bias motion of a rigid body behind the {motion.hinge.title}",
-        (LINK, TURN, BODY, *hinge_quantities(motion.hinge), PARENT_MOTION),
+        f"bias motion of a rigid body outboard of the {motion.hinge.title}",
+        (LINK, ROTATION, BODY, *hinge_quantities(motion.hinge), PARENT_MOTION),
         (NO_SHIFT, MOTION, OWN_LOAD, Quantity(rates, "", "coordinate rates")),
         (
             *_parent_transform(),
             Equation("no shift", NO_SHIFT.symbol, sp.ImmutableDenseMatrix(sp.zeros(0, 1))),
             Equation("K = wd~ + w~ w~", carrier, tilde(wd) + tilde(w) * tilde(w)),
             Equation(
-                "bias motion before the hinge",
+                "bias motion inboard of the hinge",
                 motion_q,
                 stack(back * w, back * wd, back * (rdd + carrier * lever)),
             ),
             Equation("bias motion", MOTION.symbol, body_motion(motion, motion_q)),
-            Equation("load", OWN_LOAD.symbol, of_body(body_kernels.bias_load(body), "e")),
+            Equation("load", OWN_LOAD.symbol, body_entries(body_kernels.bias_load(body), "e")),
             Equation("coordinate rates", rates, motion.in_arrays(motion.rates)),
         ),
         sources=SOURCES,
@@ -121,12 +121,12 @@ def condense(motion: HingeMotion, body: Body) -> Derivation:
     gain, offset = _gains(nu)
     factor, z = symbol("F", nu, nu), symbol("Z", nu, 6)
     stored = sp.ImmutableDenseMatrix(nu, 6, lambda i, j: z[i, j] if j < 3 else factor[i, j - 3])
-    mass = of_body(body_kernels.inertia(body), "S")
+    mass = body_entries(body_kernels.inertia(body), "S")
     steps, carried = congruence("S_Q")
     return Derivation(
         motion.hinge.name,
         f"S and e of a rigid body carried across the {motion.hinge.title}",
-        (LINK, TURN, NO_SHIFT, BODY, *inputs, OUTER_S, OUTER_E, OWN_LOAD, tau),
+        (LINK, ROTATION, NO_SHIFT, BODY, *inputs, OUTER_S, OUTER_E, OWN_LOAD, tau),
         (gain, offset, OUT_S, OUT_E),
         (
             *_parent_transform(),
@@ -159,8 +159,8 @@ def recover(motion: HingeMotion) -> Derivation:
     kept = sp.ImmutableDenseMatrix(nu, nu, lambda i, j: gain.symbol[i, 3 + j])
     return Derivation(
         motion.hinge.name,
-        f"accelerations of a rigid body behind the {motion.hinge.title}",
-        (LINK, TURN, NO_SHIFT, *hinge_quantities(motion.hinge)[:1], gain, offset, PARENT_DELTA),
+        f"accelerations of a rigid body outboard of the {motion.hinge.title}",
+        (LINK, ROTATION, NO_SHIFT, *hinge_quantities(motion.hinge)[:1], gain, offset, PARENT_DELTA),
         (rates, DELTA),
         (
             *_parent_transform(),

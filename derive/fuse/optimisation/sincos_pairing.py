@@ -37,9 +37,9 @@ class SincosLevels:
     """Statements of a kernel with its angles extracted: levels first, then the rest."""
 
     levels: tuple[Level, ...]
-    rest: tuple[Assign | Store | Guard, ...]
+    remaining: tuple[Assign | Store | Guard, ...]
 
-    def made(self) -> list[int]:
+    def defined_temporaries(self) -> list[int]:
         """Temporaries that the levels define."""
         numbers = []
         for level in self.levels:

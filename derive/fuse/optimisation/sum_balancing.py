@@ -46,7 +46,7 @@ class BalancedKernels(Mapping[str, KernelIR]):
 class _Balance:
     def __init__(self, kernel: KernelIR) -> None:
         self.kernel = kernel
-        self.by_number = {s.number: s for s in kernel.statements if isinstance(s, Assign)}
+        self.assignments = {s.number: s for s in kernel.statements if isinstance(s, Assign)}
         self.uses: dict[int, int] = {}
         for statement in kernel.statements:
             for operand in operands(statement):
@@ -61,13 +61,13 @@ class _Balance:
     def _inner_sums(self) -> set[int]:
         """Partial sums that only one other sum reads."""
         numbers = set()
-        for statement in self.by_number.values():
+        for statement in self.assignments.values():
             if statement.op not in ("add", "sub"):
                 continue
             for operand in statement.args:
                 if not isinstance(operand, Temporary) or self.uses[operand.number] > 1:
                     continue
-                if self.by_number[operand.number].op in ("add", "sub"):
+                if self.assignments[operand.number].op in ("add", "sub"):
                     numbers.add(operand.number)
         return numbers
 
@@ -126,7 +126,7 @@ class _Balance:
         while stack:
             negative, operand = stack.pop()
             if isinstance(operand, Temporary) and operand.number in self.inner:
-                open_sum(self.by_number[operand.number], negative)
+                open_sum(self.assignments[operand.number], negative)
             else:
                 terms.append((negative, operand))
         return terms
@@ -137,7 +137,7 @@ class _Balance:
             product = (
                 isinstance(operand, Temporary)
                 and self.uses[operand.number] == 1
-                and self.by_number[operand.number].op == "mul"
+                and self.assignments[operand.number].op == "mul"
             )
             renamed = self._new_operand(operand)
             ready = self._ready_time(renamed) - (_SUM if product else 0)

@@ -41,14 +41,14 @@ class BareRosenbrock:
         udot = model.accelerations(q, u) if accelerations is None else accelerations
         self._start = np.array([q, u, udot])
 
-    def fixed(self, step: float, steps: int) -> Array:
+    def fixed_step_states(self, step: float, steps: int) -> Array:
         """States (steps + 1, 3, n) with a fixed step (s)."""
         states = [self._start]
         for number in range(steps):
             states.append(self._step(number * step, step, states[-1])[0])
         return np.array(states)
 
-    def needed(self, t_end: float, rtol: float, atol: float, most: int) -> int:
+    def adaptive_step_count(self, t_end: float, rtol: float, atol: float, most: int) -> int:
         """Number of adaptive steps to t_end (s), including rejected ones.
 
         Raises NumericalFailure if it exceeds `most`.

@@ -30,8 +30,8 @@ def largest_gap(model: Model, step: float, steps: int, rate: float) -> float:
     def state_rate(y: Array) -> Array:
         q, u = np.ascontiguousarray(y[:position_count]), np.ascontiguousarray(y[position_count:])
         rates = engine.accelerations(0.0, q[None], u[None], memory)
-        position_correction = calls.correction(calls.gap, q, u)[0]
-        velocity_correction = calls.correction(calls.slip, q, u)[0]
+        position_correction = calls.correction(calls.position_level, q, u)[0]
+        velocity_correction = calls.correction(calls.velocity_level, q, u)[0]
         return np.append(
             rates[0][0],
             rates[1][0] + rate**2 * position_correction + 2 * rate * velocity_correction,
@@ -42,6 +42,6 @@ def largest_gap(model: Model, step: float, steps: int, rate: float) -> float:
         y = rk4_step(state_rate, y, step)
         if not np.isfinite(y).all() or np.abs(y).max() > 1e6:
             return float("nan")
-        gap = calls.correction(calls.gap, np.ascontiguousarray(y[:position_count]), u)[1]
+        gap = calls.correction(calls.position_level, np.ascontiguousarray(y[:position_count]), u)[1]
         largest = max(largest, float(np.abs(gap).max()))
     return largest

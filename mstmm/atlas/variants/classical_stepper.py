@@ -24,7 +24,7 @@ class ClassicalSteps:
         names = [engine.body_name(part.hinge) for part in parts]
         gravity = np.array(engine.packed.system.gravity)
         form = select_form(parts, motions, gravity, names, scene_size(parts))
-        start = np.array([form.start(k, motion) for k, motion in enumerate(motions)])
+        start = np.array([form.initial_motion(k, motion) for k, motion in enumerate(motions)])
         self.stepper = Stepper(engine, parts, form, scheme, start, iterations, product=False)
         self._states = StateConversion(engine.packed, parts, form, self.q)
 
@@ -33,10 +33,12 @@ class ClassicalSteps:
         states = self.stepper.advance(steps, step)
         if len(states) < steps:
             raise NumericalFailure(f"a step fails with code {self.stepper.run.failure}")
-        self.q = self._states.of(states)[0][-1]
+        self.q = self._states.convert(states)[0][-1]
         return self.q
 
-    def moving(self) -> list[PartMovement]:
+    def part_movements(self) -> list[PartMovement]:
         """Current motion of each part in absolute coordinates, as arrays over one time."""
         states, motions = self._states, self.stepper.motions
-        return [states.form.moving(p, k, motions[k][None]) for k, p in enumerate(states.parts)]
+        return [
+            states.form.part_movement(p, k, motions[k][None]) for k, p in enumerate(states.parts)
+        ]

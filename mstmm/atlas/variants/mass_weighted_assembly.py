@@ -16,8 +16,8 @@ from ...runtime.model.model import Model
 class MassWeightedAssembly(Assembly):
     """Assembly that minimises gaps weighted by the mobility of each row."""
 
-    def _weighted(self) -> Array:
-        super()._weighted()
+    def _compute_weights(self) -> Array:
+        super()._compute_weights()
         mobility = np.asarray(self.calls.mobility, float)
         for row, row_mobility in enumerate(mobility.tolist()):
             self.calls.records.scale(row, row_mobility)

@@ -23,6 +23,6 @@ def squared_frequencies(model: Model) -> Array:
     state = State(0.0, q, u, np.zeros(model.nu))
     mechanism = mechanism_at(model, state)
     assert mechanism is not None
-    frozen = replace(mechanism, turned=np.zeros_like(mechanism.turned))
+    frozen = replace(mechanism, constraint_stiffness=np.zeros_like(mechanism.constraint_stiffness))
     matrices = frozen.matrices(frozen.tree, state)
     return np.asarray(np.sort(np.linalg.eigvals(np.linalg.solve(matrices.M, matrices.K)).real))

@@ -36,6 +36,6 @@ def largest_velocity_error(model: Model, step: float, steps: int) -> float:
             return float("nan")
         q, u = (np.ascontiguousarray(part) for part in np.split(y, [model.nq]))
         for _ in range(_CORRECTION_COUNT):
-            q = q + calls.correction(calls.gap, q, u)[0]
-        largest = max(largest, float(np.abs(calls.correction(calls.slip, q, u)[1]).max()))
+            q = q + calls.correction(calls.position_level, q, u)[0]
+        largest = max(largest, float(np.abs(calls.correction(calls.velocity_level, q, u)[1]).max()))
     return largest

@@ -45,7 +45,8 @@ def accelerations_at_rest(
     engine, zeros = LoopedEngine(pack(closed.scene)), np.zeros(tree.nu)
     calls = LoopCalls(engine, q)
     slip_columns = [
-        calls.correction(calls.slip, q, unit_speed)[1] for unit_speed in np.eye(tree.nu, engine.nu)
+        calls.correction(calls.velocity_level, q, unit_speed)[1]
+        for unit_speed in np.eye(tree.nu, engine.nu)
     ]
     rows = np.ascontiguousarray(np.transpose(slip_columns))
     tree_q = np.ascontiguousarray(q[: tree.nq])

@@ -24,8 +24,7 @@ _RESULT_ENDING = ".nc"
 
 def view(
     what: Annotated[
-        str,
-        typer.Argument(metavar="SCENE|RESULT", help="Scene (.toml, .json) or result (.nc)."),
+        str, typer.Argument(metavar="SCENE|RESULT", help="Scene (.toml, .json) or result (.nc).")
     ],
     output: Annotated[
         list[str] | None,
@@ -105,6 +104,7 @@ def view(
 def _load_result(what: str, t_end: float | None) -> Result:
     """Result to display: a saved one, a scene at its start, or a new run of a scene."""
     import mstmm
+    from mstmm.runtime.model.execution import Execution
     from mstmm.runtime.model.result_loading import load_netcdf
 
     if Path(what).suffix.lower() == _RESULT_ENDING:
@@ -118,7 +118,9 @@ def _load_result(what: str, t_end: float | None) -> Result:
         return model.simulate(t_end=0.0, method="dop853")
     load_method("auto")
     with progress_bar() as progress:
-        return model.simulate(t_end, method="auto", rtol=1e-7, atol=1e-10, progress=progress)
+        return model.simulate(
+            t_end, method="auto", rtol=1e-7, atol=1e-10, execution=Execution(progress=progress)
+        )
 
 
 def _nearest_result(what: str, error: LoopClosureError) -> Result:

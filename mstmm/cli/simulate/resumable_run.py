@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mstmm.errors import EnvironmentFailure, Interrupted, MstmmError, RiskRefused
+from mstmm.runtime.model.execution import Execution
 
 from ..progress import ProgressBar
 
@@ -32,12 +33,12 @@ def simulate_plan(
         )
     try:
         result = model.simulate(
-            plan.t_end, plan.method, plan.step, plan.rtol, plan.atol,
+            plan.t_end, plan.method_object, plan.step, plan.rtol, plan.atol,
             None if plan.times is None else plan.times.until(plan.t_end),
-            max_step=plan.max_step, radius=plan.radius, scheme=plan.scheme,
-            iterations=plan.iterations, tangent=plan.tangent, error=plan.error, error_of=plan.of,
-            on_risk=plan.on_risk, progress=progress, resume=plan.resume,
-            checkpoint=str(plan.checkpoint) if plan.resumable else None,
+            error=plan.target_error,
+            execution=Execution(
+                plan.on_risk, progress, plan.checkpoint if plan.resumable else None, plan.resume
+            ),
         )  # fmt: skip
     except RiskRefused as rejection:
         if rejection.result is None:
@@ -56,12 +57,12 @@ def save_result(plan: RunOptions, result: Result, seconds: float, progress: Prog
     if result.trajectory.is_comparable and (is_short if plan.certify is None else plan.certify):
         from mstmm.runtime.result.export import result_files
 
-        result_files.save_result(result, plan.output)
+        result_files.save_result(result, plan.result_file)
         from mstmm.runtime.model.run_results import certify_result
 
         progress.label("estimating the error")
         result = certify_result(result, progress)
-    result.save(plan.output)
+    result.save(plan.result_file)
     return result
 
 

@@ -1,15 +1,35 @@
-"""Checked options of `mstmm simulate`."""
+"""Options of `mstmm simulate`: one field each, declared for the command line here alone."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
-from mstmm.defaults import METHOD
+import typer
+
+from mstmm.defaults import ATOL, METHOD, RTOL
 from mstmm.errors import MstmmError
+from mstmm.runtime.integrate import methods
 
+from ..extra_checks import result_ending
+from ..graphics.plot import PLOT_ENDINGS, RESULT_ENDINGS
 from ..model_loading import EXTERNAL_PREFIXES
-from ..options import OutputTimes
+from ..options import (
+    Elements,
+    Json,
+    OutputTimes,
+    option,
+    output_file,
+    parse_not_negative,
+    parse_positive,
+    parse_times,
+)
+
+if TYPE_CHECKING:
+    from mstmm.runtime.model.target_error.error_request import ErrorRequest
 
 #: Largest number of fixed steps of a run.
 MAX_STEPS = 1e11
@@ -17,38 +37,103 @@ MAX_STEPS = 1e11
 #: Prefix of the names of the classical discrete-time method.
 _CLASSICAL_PREFIX = "dttmm-classical"
 
+_METHOD_HELP = "Integration method, see `mstmm list methods`; auto chooses one."
+_ERROR_HELP = (
+    "Target error of the whole run, in place of tolerances: rad, or relative to the motion; "
+    "several runs may be made."
+)
+_OF_HELP = "Quantity to which --error applies, in its unit, such as rod1.tip.position; repeatable."
+_TIMES_HELP = "Output times: a count (201) or an interval in s (0.05, 1s); default: every step."
+_OUTPUT_HELP = "Result file: .nc, .csv or .mat; default: scene name, current folder."
+_QUANTITY_HELP = (
+    "Quantity to plot and print, such as shoulder.angle, rod1.tip.position, energy; repeatable."
+)
+_INPUT_HELP = "Value of a scene input, or the name of a signal; repeatable."
+_CERTIFY_HELP = "Estimate the error with a second, more accurate run; default: after short runs."
+_SWEEP_HELP = (
+    "Sweep: riccati; refined or qr for large mass ratios; product (plain product, chains only); "
+    "auto: the first that is accurate enough at the start."
+)
+_ENGINE_HELP = "auto, looped (generic C loop) or fused (C compiled for this scene)."
+_FLEXIBILITY_HELP = (
+    "Model level of all flexible bodies: coupled, one-way or rigid; default: as in the scene."
+)
+_ACCURACY_HELP = (
+    "Largest estimated error of a trusted result: rad, or relative to the motion (0.01)."
+)
+_ON_RISK_HELP = (
+    "Action if the result is in doubt: warn; refuse (before the run, else exit code 4 after "
+    "saving); ignore."
+)
+_SIMPLIFY_HELP = "Merge bodies on fixed hinges, and snap nearly right angles to exact ones."
+_TURNS_HELP = "Tolerance for snapping to right angles, rad (1e-11; 0 switches it off)."
+
 
 @dataclass(frozen=True)
 class RunOptions:
-    """Options of a run, checked."""
+    """Options of a run as given; `method_options` are those of its integration method."""
 
-    scene: str
-    t_end: float
-    method: str | None
-    step: float | None
-    rtol: float | None
-    atol: float | None
-    times: OutputTimes | None
-    output: Path
-    plot: Path | None
-    quantities: tuple[str, ...]
-    certify: bool | None
-    resume: bool
-    sweep: str = "auto"
-    engine: str = "auto"
-    flexibility: str | None = None
-    accuracy: float | None = None
-    max_step: float = 0.0
-    radius: float | None = None
-    scheme: str = ""
-    iterations: int = 1
-    tangent: str = "auto"
-    error: float | None = None
-    of: tuple[str, ...] = ()
-    on_risk: str = "warn"
-    inputs: tuple[str, ...] = ()
-    simplify: bool = True
-    turns: float | None = None
+    scene: Annotated[str, typer.Argument(metavar="SCENE", help="Scene file, .toml or .json.")]
+    t_end: Annotated[float, option("--t-end", "S", "End time, s.", parse_positive)] = 10.0
+    method: Annotated[
+        str | None,
+        option("--method", "NAME", _METHOD_HELP, show_default=f"auto, {METHOD} with --step"),
+    ] = None
+    step: Annotated[
+        float | None,
+        option(
+            "--step", "S", "Fixed time step, s; required by fixed-step methods.", parse_positive
+        ),
+    ] = None
+    rtol: Annotated[
+        float | None,
+        option("--rtol", "X", "Relative tolerance.", parse_positive, show_default=f"{RTOL:g}"),
+    ] = None
+    atol: Annotated[
+        float | None,
+        option("--atol", "X", "Absolute tolerance.", parse_not_negative, show_default=f"{ATOL:g}"),
+    ] = None
+    error: Annotated[float | None, option("--error", "X", _ERROR_HELP, parse_positive)] = None
+    of: Annotated[list[str] | None, option("--of", "NAME", _OF_HELP)] = None
+    times: Annotated[OutputTimes | None, option("--times", "N|DT", _TIMES_HELP, parse_times)] = None
+    output: Annotated[str | None, option("--output/-o", "FILE", _OUTPUT_HELP)] = None
+    plot: Annotated[str | None, option("--plot", "FILE", "Plot file: .png, .svg or .pdf.")] = None
+    quantity: Annotated[list[str] | None, option("--quantity/-q", "NAME", _QUANTITY_HELP)] = None
+    inputs: Annotated[list[str] | None, option("--input", "NAME=VALUE", _INPUT_HELP)] = None
+    hinge: Elements = None
+    certify: Annotated[bool | None, typer.Option("--certify/--no-certify", help=_CERTIFY_HELP)] = (
+        None
+    )
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Continue an interrupted run, with the same options.")
+    ] = False
+    sweep: Annotated[str, option("--sweep", "NAME", _SWEEP_HELP)] = "auto"
+    engine: Annotated[str, option("--engine", "NAME", _ENGINE_HELP)] = "auto"
+    flexibility: Annotated[str | None, option("--flexibility", "LEVEL", _FLEXIBILITY_HELP)] = None
+    accuracy: Annotated[float | None, option("--accuracy", "X", _ACCURACY_HELP, parse_positive)] = (
+        None
+    )
+    on_risk: Annotated[str, option("--on-risk", "ACTION", _ON_RISK_HELP)] = "warn"
+    simplify: Annotated[bool, typer.Option("--simplify/--no-simplify", help=_SIMPLIFY_HELP)] = True
+    turns: Annotated[float | None, option("--turns", "X", _TURNS_HELP, parse_not_negative)] = None
+    json: Json = False
+    method_options: Mapping[str, Any] = field(default_factory=dict)
+
+    @cached_property
+    def result_file(self) -> Path:
+        """Checked path of the result."""
+        default = (Path(self.scene).stem or "result") + result_ending()
+        return output_file(default if self.output is None else self.output, RESULT_ENDINGS)
+
+    @cached_property
+    def plot_file(self) -> Path | None:
+        """Checked path of the plot; None without one."""
+        return None if self.plot is None else output_file(self.plot, PLOT_ENDINGS, "--plot")
+
+    @property
+    def checkpoint(self) -> Path:
+        """File in which an interrupted run saves its state."""
+        return self.result_file.with_name(self.result_file.name + ".checkpoint")
 
     @property
     def resumable(self) -> bool:
@@ -60,32 +145,33 @@ class RunOptions:
         return self.error is None and not is_external
 
     @property
-    def checkpoint(self) -> Path:
-        """File in which an interrupted run saves its state."""
-        return self.output.with_name(self.output.name + ".checkpoint")
+    def method_object(self) -> methods.Method:
+        """Integration method with its options.  SceneError for one that it does not have."""
+        return methods.method(self.method or "", **self.method_options)
 
+    @property
+    def target_error(self) -> ErrorRequest | None:
+        """Target error with its quantities; None without one."""
+        from mstmm.runtime.model.target_error.error_request import ErrorRequest
 
-def require_feasible_step(plan: RunOptions) -> None:
-    """Reject a step so small that the run would never end."""
-    if plan.step is not None and plan.t_end / plan.step > MAX_STEPS:
-        raise MstmmError(
-            f"--step {plan.step:g}: {plan.t_end / plan.step:.1e} steps would never end; "
-            f"use {plan.t_end / MAX_STEPS:.1e} s or more"
-        )
+        return None if self.error is None else ErrorRequest(self.error, tuple(self.of or ()))
 
-
-def require_options_of_error(plan: RunOptions) -> None:
-    """Reject options that contradict --error.
-
-    The several runs for a target error write no checkpoint, and the target error is the accuracy.
-    """
-    if plan.error is not None and plan.resume:
-        raise MstmmError(
-            "--resume: runs with --error write no checkpoint; run it again, or use the method and "
-            "the tolerances found by such a run"
-        )
-    if plan.error is not None and plan.accuracy is not None:
-        raise MstmmError(
-            "--accuracy with --error: a result is trusted if it reaches --error; leave out "
-            "--accuracy"
-        )
+    def check(self) -> None:
+        """Reject options that contradict each other, and steps with which the run never ends."""
+        if self.step is not None and self.t_end / self.step > MAX_STEPS:
+            raise MstmmError(
+                f"--step {self.step:g}: {self.t_end / self.step:.1e} steps would never end; "
+                f"use {self.t_end / MAX_STEPS:.1e} s or more"
+            )
+        if self.error is None and self.of:
+            raise MstmmError(f"--of {self.of[0]}: expected a target error for it; give --error too")
+        if self.error is not None and self.resume:
+            raise MstmmError(
+                "--resume: runs with --error write no checkpoint; run it again, or use the method "
+                "and the tolerances found by such a run"
+            )
+        if self.error is not None and self.accuracy is not None:
+            raise MstmmError(
+                "--accuracy with --error: a result is trusted if it reaches --error; leave out "
+                "--accuracy"
+            )

@@ -22,13 +22,13 @@ def was_interrupted(result: Result) -> bool:
 
 
 def report_run(
-    plan: RunOptions, result: Result, seconds: float, json: bool, refused: RiskRefused | None
+    plan: RunOptions, result: Result, seconds: float, refused: RiskRefused | None
 ) -> None:
     """Report a run on the terminal or as JSON."""
     from .. import run_summary, terminal_output
 
-    files_written = [str(path) for path in (plan.output, plan.plot) if path is not None]
-    if json:
+    files_written = [str(path) for path in (plan.result_file, plan.plot_file) if path is not None]
+    if plan.json:
         data = run_summary.to_json(result, seconds, _plan_verdict(plan, result))
         data |= {"scene": plan.scene, "files": files_written}
         if refused is not None:
@@ -46,10 +46,10 @@ def report_run(
             f"{result.message}; continue with the same command and --resume"
         )
     elif was_interrupted(result):
-        terminal_output.print_error(f"{result.message}; the result so far is in {plan.output}")
+        terminal_output.print_error(f"{result.message}; the result so far is in {plan.result_file}")
     elif not result.success:
         terminal_output.print_error(
-            f"{plan.scene}: {result.message}; the result so far is in {plan.output}"
+            f"{plan.scene}: {result.message}; the result so far is in {plan.result_file}"
         )
 
 
@@ -62,7 +62,7 @@ def _print_report(plan: RunOptions, result: Result, seconds: float, made: list[s
     from .. import run_summary, terminal_output
 
     console = terminal_output.table_console()
-    verdict, has_reasons = _plan_verdict(plan, result), result.trajectory.told
+    verdict, has_reasons = _plan_verdict(plan, result), result.trajectory.reported_risks
     for line in run_summary.verdict_lines(verdict, console.width, has_reasons):
         terminal_output.print_lines(line)
     terminal_output.print_lines(
@@ -77,7 +77,9 @@ def _print_report(plan: RunOptions, result: Result, seconds: float, made: list[s
     if len(result.t):
         terminal_output.print_lines()
         terminal_output.print_lines(
-            run_summary.fitting_table(result, plan.quantities, _TABLE_ROWS, console.width)
+            run_summary.fitting_table(
+                result, tuple(plan.quantity or ()), _TABLE_ROWS, console.width
+            )
         )
     terminal_output.print_lines()
     for line in run_summary.certificate_lines(result, console.width):
@@ -92,5 +94,5 @@ def print_risks(plan: RunOptions, refused: RiskRefused) -> int:
     """Print the risks of a rejected result, and return the exit code."""
     from .. import terminal_output
 
-    terminal_output.print_error(f"{plan.scene}: {refused}\nthe result is in {plan.output}")
+    terminal_output.print_error(f"{plan.scene}: {refused}\nthe result is in {plan.result_file}")
     return refused.exit_code

@@ -101,7 +101,7 @@ def advise(
             progress=progress_callback(progress, budget),
             state=terminal_output.print_note,
         )
-    files = [] if file is None else [str(advice.write(file))]
+    files = [] if file is None else [str(advice.save_scene(file))]
     if json:
         terminal_output.print_json({**advice.to_dict(), "file": scene, "files": files})
     else:
@@ -127,7 +127,7 @@ def _print_advice(made: Advice, files: list[str]) -> None:
     terminal_output.print_lines()
     for body in made.bodies:
         terminal_output.print_lines(f"{body.name}: {body.reason}")
-    for text in (*made.changes, *made.notes):
+    for text in (*made.other_changes, *made.notes):
         terminal_output.print_lines(text)
     if files:
         terminal_output.print_lines(f"wrote {' and '.join(files)}")

@@ -130,7 +130,7 @@ def progress_callback(shown: ProgressBar, budget: float) -> Callable[[str], None
     def show(text: str) -> None:
         spent = min(time.monotonic() - start_time, budget)
         shown.label(text)
-        shown.share(spent / budget, f"{spent:.0f} of {budget:g} s")
+        shown.show_fraction(spent / budget, f"{spent:.0f} of {budget:g} s")
 
     return show
 
@@ -156,7 +156,7 @@ def _print_chart(made: Chart, files: list[str]) -> None:
             console.print(terminal_output.build_table(title, columns, rows))
             terminal_output.print_lines()
     for refused, word in ((True, "does not apply"), (False, "left out")):
-        for text in skip_reasons(made.left_out, refused, _MAX_NAMED):
+        for text in skip_reasons(made.skipped, refused, _MAX_NAMED):
             terminal_output.print_lines(f"{word}: {text}")
     if missing_packages("plot"):
         terminal_output.print_lines(

@@ -23,7 +23,7 @@ from .linear_options import (
 
 if TYPE_CHECKING:
     from mstmm.array_validation import Array
-    from mstmm.risk import AssessedAnswer
+    from mstmm.risk import AssessedResult
     from mstmm.runtime.linear.linear_model import Linear
     from mstmm.runtime.linear.modes import Modes
 
@@ -56,32 +56,32 @@ def linearize(
 
     options = LinearOptions(scene, at_start, change, output, plot, hinge, json, friction)
     linear = options.linear(inputs)
-    if options.answered(linear):
+    if options.write_answer(linear):
         return
     _print_assessment(linear)
     terminal.print_lines(
-        f"coordinates {len(linear)}, inputs {len(linear.inputs)}, "
-        f"disturbances {len(linear.disturbances)}"
+        f"coordinates {len(linear)}, inputs {len(linear.input_names)}, "
+        f"disturbances {len(linear.disturbance_names)}"
     )
     head, rows = _table_rows(linear)
     terminal.table_console().print(terminal.build_table("", head, rows[:_MAX_ROWS]))
     if len(rows) > _MAX_ROWS:
         terminal.print_lines(f"and {len(rows) - _MAX_ROWS} more")
-    options.say_where("all matrices: --output FILE.csv or .nc, or --json")
+    options.print_file_names("all matrices: --output FILE.csv or .nc, or --json")
 
 
 def _table_rows(linear: Linear) -> tuple[list[str], list[list[str]]]:
-    """Table of the diagonals of M, C and K; for a first-order model the largest entries of A."""
+    """Header and rows: diagonals of M, C, K; for a first-order model the largest entry per row."""
     if linear.has_stiffness:
         diagonals = (matrix.diagonal() for matrix in (linear.M, linear.C, linear.K))
         numbers = ([f"{x:.5g}" for x in row] for row in zip(*diagonals, strict=True))
-        rows = [[name, *row] for name, row in zip(linear.coordinates, numbers, strict=True)]
+        rows = [[name, *row] for name, row in zip(linear.coordinate_names, numbers, strict=True)]
         return ["coordinate", "M>", "C>", "K (diagonals)>"], rows
     rows, rounding = [], _MAX_ROUNDING * abs(linear.A).max(initial=0.0)
-    for name, row in zip(linear.states, linear.A, strict=True):
+    for name, row in zip(linear.state_names, linear.A, strict=True):
         largest = (-abs(row)).argsort(kind="stable")[:_MAX_NAMED]
         columns = [k for k in largest if abs(row[k]) > rounding]
-        rows.append([name, ", ".join(f"{row[k]:.5g} {linear.states[k]}" for k in columns)])
+        rows.append([name, ", ".join(f"{row[k]:.5g} {linear.state_names[k]}" for k in columns)])
     return ["state", "rate (largest entries of A)"], rows
 
 
@@ -123,20 +123,20 @@ def modes(
     linear = options.linear(None)
     max_count = None if count is None or not len(linear) else min(count, len(linear))
     result = linear.modes(max_count, False if undamped else None)
-    options.show(result)
-    if options.answered(result):
+    options.write_animation(result)
+    if options.write_answer(result):
         return
     _print_assessment(result)
-    units = ["Hz>", "rad/s>"] if result.undamped else ["damped Hz>", "undamped rad/s>"]
+    units = ["Hz>", "rad/s>"] if result.is_undamped else ["damped Hz>", "undamped rad/s>"]
     head = ["mode>", *units, "damping>", "moves most", "kinetic energy"]
-    energy_shares = result.first(_MAX_ROWS).kinetic()
+    energy_shares = result.lowest(_MAX_ROWS).kinetic_energy_shares()
     rows = [
         [
             str(k + 1),
             f"{result.frequency[k]:.6g}",
             f"{result.omega[k]:.6g}",
-            f"{result.damping[k]:.4g}",
-            ", ".join(result.moving(k)[:_MAX_NAMED]),
+            f"{result.damping_ratio[k]:.4g}",
+            ", ".join(result.dominant_coordinates(k)[:_MAX_NAMED]),
             _largest_owners(energy_shares, k),
         ]
         for k in range(min(_MAX_ROWS, len(result)))
@@ -144,7 +144,7 @@ def modes(
     terminal.table_console().print(terminal.build_table("", head, rows))
     if len(result) > _MAX_ROWS:
         terminal.print_lines(f"and {len(result) - _MAX_ROWS} more: --count N, or --output FILE.csv")
-    if not result.undamped and len(result):
+    if not result.is_undamped and len(result):
         terminal.print_lines(
             "damped: frequency of the oscillation, |Im s|/(2 pi); undamped: |s| of eigenvalue s"
         )
@@ -153,7 +153,7 @@ def modes(
     )
     if result.frame == "rotating":
         terminal.print_lines("frequencies are those of the rotating frame")
-    options.say_where("")
+    options.print_file_names("")
 
 
 def frf(
@@ -252,7 +252,7 @@ def frf(
         exact=True if exact == ["all"] else exact or False,
     )  # fmt: skip
     response = evaluate(omega)
-    if options.answered(response):
+    if options.write_answer(response):
         return
     _print_assessment(response)
     eigenvalues = (
@@ -261,23 +261,30 @@ def frf(
     if losses or any(ratios):
         eigenvalues = eigenvalues - _ASSUMED_DAMPING * np.abs(eigenvalues)
     peaks = find_peaks(evaluate, response, np.asarray(eigenvalues, dtype=np.complex128), _MAX_ROWS)
-    pairs = [(i, j) for i in range(len(response.outputs)) for j in range(len(response.inputs))]
+    pairs = [
+        (i, j) for i in range(len(response.output_names)) for j in range(len(response.input_names))
+    ]
     rows = []
     for (i, j), size, peak_omega in zip(pairs, *peaks, strict=False):
         unit = f"{response.output_units[i]} / {response.input_units[j]}"
         peak_text = f"{size:.4g} {unit}" if np.isfinite(size) else f"unbounded {unit}, undamped"
         rows.append(
-            [response.outputs[i], response.inputs[j], peak_text, f"{peak_omega / (2 * np.pi):.5g}"]
+            [
+                response.output_names[i],
+                response.input_names[j],
+                peak_text,
+                f"{peak_omega / (2 * np.pi):.5g}",
+            ]
         )
     terminal.table_console().print(
         terminal.build_table("", ["output", "input", "peak>", "at Hz>"], rows)
     )
     if len(pairs) > _MAX_ROWS:
         terminal.print_lines(f"and {len(pairs) - _MAX_ROWS} more")
-    options.say_where("all values: --output FILE.csv or .nc, --plot FILE.png or --json")
+    options.print_file_names("all values: --output FILE.csv or .nc, --plot FILE.png or --json")
 
 
-def _print_assessment(answer: AssessedAnswer) -> None:
+def _print_assessment(answer: AssessedResult) -> None:
     """Print the verdict on an answer and its warnings."""
     from .. import terminal_output as terminal
 
@@ -293,8 +300,8 @@ def _largest_owners(shares: dict[str, Array], k: int) -> str:
 
 
 def _completeness_text(found: Modes) -> str:
-    if found.complete is None:
+    if found.is_complete is None:
         return "completeness below the last mode not checked: damping or follower loads"
-    if found.complete:
+    if found.is_complete:
         return "all modes below the last one are found (checked by count)"
     return "modes below the last one are missing; request more: --count N"

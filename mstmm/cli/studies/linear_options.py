@@ -64,13 +64,13 @@ class LinearOptions:
     hinge: list[str] | None
     json: bool
     friction: list[str] | None = None
-    seen: str | None = None  #: only for modes: file of their animation
+    animation_path: str | None = None  #: only for modes: file of their animation
 
     def linear(self, inputs: list[str] | None) -> Linear:
         """Linearise the scene, after a check of all output files."""
         self._file()
         self._picture()
-        _output_path(self.seen, VIEW_ENDINGS, "--view")
+        _output_path(self.animation_path, VIEW_ENDINGS, "--view")
         generate_elements(self.hinge or [])
         model = _compile_changed(self.scene, self.change or [])
         state = model.initial_state() if self.at_start else (None, None)
@@ -83,12 +83,12 @@ class LinearOptions:
     def _picture(self) -> Path | None:
         return _output_path(self.plot, _PLOT_ENDINGS, "--plot")
 
-    def show(self, modes: Modes) -> None:
+    def write_animation(self, modes: Modes) -> None:
         """Write the animation of the modes, if a file is given."""
-        if self.seen is not None:
-            modes.view(self.seen, title=title_from_path(Path(self.scene)))
+        if self.animation_path is not None:
+            modes.view(self.animation_path, title=title_from_path(Path(self.scene)))
 
-    def answered(self, answer: Linear | Modes | FrequencyResponse) -> bool:
+    def write_answer(self, answer: Linear | Modes | FrequencyResponse) -> bool:
         """Write the files, and with --json print the answer; True if it has been printed."""
         from .. import terminal_output as terminal
 
@@ -99,12 +99,12 @@ class LinearOptions:
             answer.plot(picture)
         if self.json:
             files = {"file": self.output, "plot": self.plot}
-            if self.seen is not None:
-                files["view"] = self.seen
+            if self.animation_path is not None:
+                files["view"] = self.animation_path
             terminal.print_json({"scene": self.scene, **answer.to_dict(), **files})
         return self.json
 
-    def say_where(self, other: str) -> None:
+    def print_file_names(self, other: str) -> None:
         """Print the names of the files written; without result file and plot, print `other`."""
         from .. import terminal_output as terminal
 
@@ -112,8 +112,8 @@ class LinearOptions:
             terminal.print_lines(f"wrote {self.output}")
         if self.plot is not None:
             terminal.print_lines(f"wrote {self.plot}")
-        if self.seen is not None:
-            terminal.print_lines(f"wrote {self.seen}")
+        if self.animation_path is not None:
+            terminal.print_lines(f"wrote {self.animation_path}")
         if other and self.output is None and self.plot is None:
             terminal.print_lines(other)
 

@@ -98,7 +98,7 @@ def _measure_atlas(wanted: list[str] | None) -> Atlas:
 
         def progress(name: str, number: int, count: int) -> None:
             shown.label(f"case {name}")
-            shown.share(number / count, f"{number} of {count} cases")
+            shown.show_fraction(number / count, f"{number} of {count} cases")
 
         return measured(wanted, progress=progress)
 

@@ -68,7 +68,7 @@ def _view_html(view: SceneView | None) -> str:
     """HTML of a strip of pictures, and of the animation embedded in the page."""
     if view is None:
         return ""
-    picture = b64encode(view.picture(_PICTURE_COUNT)).decode("ascii")
+    picture = b64encode(view.strip_png(_PICTURE_COUNT)).decode("ascii")
     strip = (
         f'<img alt="the mechanism at {_PICTURE_COUNT} times" '
         f'src="data:image/png;base64,{picture}"/>'

@@ -23,17 +23,17 @@ _MAX_LISTED_ROWS = 12
 def verdict_html(result: Result) -> str:
     """HTML of the verdict: whether, to how many digits and until when the numbers are reliable."""
     verdict = result.certificate.verdict()
-    kind = "bad" if verdict.against else "good" if verdict.trusted else "open"
+    kind = "bad" if verdict.objections else "good" if verdict.trusted else "open"
     parts, _, reason = str(verdict).partition(": ")
     lines = [f"<p><b>{text(parts[0].upper() + parts[1:])}</b>: {text(reason)}.</p>"]
     lines += [f"<p>{text(sentence)}</p>" for sentence in _error_sentences(result)]
-    reasons = bullets(verdict.against) if len(verdict.against) > 1 else ""
+    reasons = bullets(verdict.objections) if len(verdict.objections) > 1 else ""
     return f'<div class="verdict {kind}">{"".join(lines)}{reasons}</div>'
 
 
 def _error_sentences(result: Result) -> Iterator[str]:
     """Sentences on the size of the error, and until when it applies."""
-    certificate, estimate = result.certificate, result.error_estimate
+    certificate, estimate = result.certificate, result.achieved_error
     if estimate is not None:
         yield f"Target error: {estimate}"
     error, predictable_until = certificate.error, certificate.predictable_until
@@ -51,13 +51,13 @@ def _error_sentences(result: Result) -> Iterator[str]:
             "motion, but no prediction."
         )
     if error is not None or estimate is not None:
-        yield f"The error refers to {certificate.covers}."
+        yield f"The error refers to {certificate.error_scope}."
 
 
 def _digits_clause(error: ErrorEstimate) -> str:
     """Clause with the number of reliable digits of coordinates, relative to their excursion."""
-    shares = [value / error.moved.get(unit, 0.0) for unit, value in error.largest("q").items()
-              if error.moved.get(unit, 0.0) > 0]  # fmt: skip
+    shares = [value / error.excursion.get(unit, 0.0) for unit, value in error.largest("q").items()
+              if error.excursion.get(unit, 0.0) > 0]  # fmt: skip
     largest_share = max(shares, default=0.0)
     if not shares or largest_share >= _MAX_ERROR_WITH_DIGITS:
         return ""
@@ -75,12 +75,12 @@ def settings_html(result: Result) -> str:
     rows = [
         ("time", f"{settings.t_start:g} to {settings.t_end:g} s, {len(result.t)} samples"),
         ("outcome", result.message), ("method", f"{settings.method}, {accuracy}"),
-        ("engine", model.engine_choice or model.engine), ("sweep", model.sweep),
+        ("engine", model.engine_reason or model.engine), ("sweep", model.sweep),
     ]  # fmt: skip
     if statistics is not None:
-        rows.append(("steps", f"{statistics.steps}, {statistics.rejected} rejected"))
+        rows.append(("steps", f"{statistics.steps}, {statistics.rejected_steps} rejected"))
         rows.append(("evaluations", f"{statistics.evaluations}"))
-    method_texts = [str(stretch) for stretch in result.methods]
+    method_texts = [str(stretch) for stretch in result.method_history]
     choices = (
         collapsible("Methods chosen, with time and reason", bullets(method_texts))
         if method_texts
@@ -93,7 +93,7 @@ def _simplifications_html(result: Result) -> str:
     """HTML of model levels of flexible bodies with their limits, and of simplifications."""
     rows = [
         (name, body.n, body.frame, "; ".join(body.notes) or "nothing")
-        for name, body in result.model.flexible.items()
+        for name, body in result.model.flexible_bodies.items()
     ]
     head = ("flexible body", "shapes", "floating frame", "notes")
     html = f'<div class="long">{table(rows, head)}</div>' if rows else ""
@@ -112,10 +112,13 @@ def mechanism_html(result: Result) -> str:
         for hinge in list(scene.hinges[:_MAX_LISTED])
     ]
     bodies = [
-        (body.name, "flexible" if body.name in result.model.flexible else f"{body.mass:g} kg",
-         ", ".join(body.ends) or "none")
+        (
+            body.name,
+            "flexible" if body.name in result.model.flexible_bodies else f"{body.mass:g} kg",
+            ", ".join(body.ends) or "none",
+        )
         for body in list(scene.skeleton.bodies[:_MAX_LISTED])
-    ]  # fmt: skip
+    ]
     count = f"{len(scene.skeleton.bodies)} bodies, {len(scene.hinges)} hinges"
     lists = table(hinges, ("hinge", "type", "inboard", "outboard"))
     lists += "<p></p>" + table(bodies, ("body", "mass", "ends"))
@@ -124,25 +127,30 @@ def mechanism_html(result: Result) -> str:
 
 def _loops_html(result: Result) -> str:
     """HTML of closed loops: cut hinges, rank, mobility and indeterminate loads."""
-    if result.model.closed is None:
+    if result.model.loop_start is None:
         return ""
-    loops = result.model.closed.loops
+    loops = result.model.loop_start.loops
     rows = [
-        ("loops closed by", ", ".join(loops.cut[:_MAX_LISTED_ROWS]) or "constraints and couplings"),
-        ("independent rows", f"{loops.rank} of {len(loops.rows)}"),
+        (
+            "loops closed by",
+            ", ".join(loops.cut_hinges[:_MAX_LISTED_ROWS]) or "constraints and couplings",
+        ),
+        ("independent rows", f"{loops.rank} of {len(loops.constraint_rows)}"),
         ("mobility", loops.mobility),
-        ("redundant rows", loops.repeated(_MAX_LISTED_ROWS) or "none"),
-        ("indeterminate loads", loops.open_loads or "none"),
+        ("redundant rows", loops.redundant_text(_MAX_LISTED_ROWS) or "none"),
+        ("indeterminate loads", loops.indeterminate_text or "none"),
     ]
     if loops.singular:
-        rows.append(("start", f"singular configuration: {loops.nearby} independent rows nearby"))
+        rows.append(
+            ("start", f"singular configuration: {loops.generic_rank} independent rows nearby")
+        )
     return "<h3>Closed loops</h3>" + table(rows)
 
 
 def certificate_html(result: Result) -> str:
     """HTML of all lines of the certificate, and of the risks with their remedies."""
-    body = table(result.certificate.rows(verdict=False, warnings=False))
-    risks = [(risk.element, risk.means, risk.remedy) for risk in result.risks]
+    body = table(result.certificate.as_pairs(verdict=False, warnings=False))
+    risks = [(risk.element, risk.description, risk.remedy) for risk in result.risks]
     if risks:
         body += "<h3>Risks</h3>" + table(risks, ("element", "finding", "remedy"))
     return body

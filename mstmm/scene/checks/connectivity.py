@@ -41,7 +41,7 @@ class ConnectivityGraph:
             else (len(self.index) + chain_position[0], chain_position[1])
         )
 
-    def place(self, edge: int) -> tuple[str, int]:
+    def scene_location(self, edge: int) -> tuple[str, int]:
         """Table and index of an edge in the scene."""
         hinges = len(self.scene.hinge)
         return ("hinge", edge) if edge < hinges else ("chain", edge - hinges)
@@ -53,12 +53,12 @@ class ConnectivityGraph:
 
     def edge_name(self, edge: int) -> str:
         """Name of an edge for messages."""
-        table, number = self.place(edge)
+        table, number = self.scene_location(edge)
         name: str = getattr(self.scene, table)[number].name
         return f"{name}[0].hinge" if table == "chain" else name
 
     @property
-    def by_nodes(self) -> MechanismGraph:
+    def node_mechanism(self) -> MechanismGraph:
         """Mechanism of nodes and edges, sufficient to find out whether there is a tree."""
         cuts = [hinge.cut for hinge in self.scene.hinge]
         return MechanismGraph(self.nodes, tuple(
@@ -66,7 +66,7 @@ class ConnectivityGraph:
             for edge, node in enumerate(self.outboard)
         ))  # fmt: skip
 
-    def by_bodies(self) -> MechanismGraph:
+    def body_mechanism(self) -> MechanismGraph:
         """Mechanism of all bodies and hinges by scene number, with the rows of all closures."""
         return MechanismGraph(
             len(self.scene.bodies), tuple(self._edges()), tuple(closure_row_groups(self.scene))

@@ -208,16 +208,28 @@ def risks(scene: SceneTables) -> tuple[Risk, ...]:
         if message is not None:
             means = f"{name}: inertia: {message}; accepted because of allow_unphysical_inertia"
             remedy = "correct it unless it does not describe a real body"
-            warnings.append(Risk("inertia", name, means, remedy, doubt=False, before=True))
+            warnings.append(
+                Risk("inertia", name, means, remedy, invalidates=False, seen_before_run=True)
+            )
         rounded_moments += [(name, x) for k, x in enumerate(body.inertia[:3])
                   if x < 0 and body.inertia_matrix[k][k] == 0]  # fmt: skip
     if rounded_moments:
         name, entry = rounded_moments[0]
         more_text = f" (and {len(rounded_moments) - 1} more)" if len(rounded_moments) > 1 else ""
         means = f"{name}: inertia: {entry:.3g} kg m^2 is rounding and is treated as zero{more_text}"
-        warnings.append(Risk(
-            "inertia", name, means, "write 0", entry, 0.0, "kg*m2", doubt=False, before=True,
-        ))  # fmt: skip
+        warnings.append(
+            Risk(
+                "inertia",
+                name,
+                means,
+                "write 0",
+                entry,
+                0.0,
+                "kg*m2",
+                invalidates=False,
+                seen_before_run=True,
+            )
+        )
     return (
         *warnings,
         *_proportion_warnings(scene),
@@ -245,8 +257,8 @@ def _proportion_warnings(scene: SceneTables) -> Iterator[Risk]:
             yield Risk(
                 "proportions", name,
                 f"{name}: it extends over {extent:g} m with a mass of {body.mass:g} kg",
-                "lengths are in m and masses in kg; convert other units",
-                body.mass / extent, _MAX_LIGHT_MASS_PER_LENGTH, "kg/m", doubt=False, before=True,
+                "lengths are in m and masses in kg; convert other units", body.mass / extent,
+                _MAX_LIGHT_MASS_PER_LENGTH, "kg/m", invalidates=False, seen_before_run=True,
             )  # fmt: skip
 
 

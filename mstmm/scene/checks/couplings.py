@@ -191,7 +191,7 @@ def _all_driven_message(scene: SceneTables, names: list[Name]) -> str | None:
         number, _, entry = resolve_coordinate(scene, name)
         hinge = scene.hinges[number]
         if (
-            hinge.lets_go
+            hinge.is_released
             or hinge.name in released_hinges
             or not any((hinge.drive or ())[entry : entry + 1])
         ):

@@ -61,5 +61,5 @@ def _angle_warnings(what: str, values: tuple[float, ...], at: int | None = None)
                 "degrees", what.partition(": ")[0],
                 f"{what}: {value:.6g} rad is {abs(value) / (2 * math.pi):.3g} turns",
                 f"if degrees were meant, write {math.radians(value):.6g}", abs(value), 2 * math.pi,
-                "rad", doubt=False, before=True,
+                "rad", invalidates=False, seen_before_run=True,
             )  # fmt: skip

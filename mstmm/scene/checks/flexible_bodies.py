@@ -66,7 +66,7 @@ def problems(scene: SceneTables) -> Iterator[Problem]:
 def spin_problems(scene: SceneTables) -> Iterator[Problem]:
     """Problems of beams that can spin about their axis but have no inertia about it."""
     carriers = {name for name, _ in _inboard_ends(scene)}
-    released = {hinge.name for hinge in scene.hinge if hinge.lets_go}
+    released = {hinge.name for hinge in scene.hinge if hinge.is_released}
     released |= {event.hinge for event in scene.event if event.hinge is not None}
     inboard_hinges: dict[str, list[Hinge]] = {beam.name: [] for beam in scene.beam}
     for hinge in scene.hinge:
@@ -161,7 +161,7 @@ def flexible_warnings(scene: SceneTables) -> Iterator[Risk]:
             ratio, name = max(body.damping.ratio), _body_label(scene, body.name)
             yield Risk(
                 "damping", name, f"{name}: damping: a ratio of {ratio:g} is critical or above",
-                "write 0.01 for 1 percent", ratio, 1.0, doubt=False, before=True,
+                "write 0.01 for 1 percent", ratio, 1.0, invalidates=False, seen_before_run=True,
             )  # fmt: skip
     inboard_hinges = inboard_hinges_by_body(scene)
     for beam in scene.beam:
@@ -209,7 +209,7 @@ def short_beam_warnings(scene: SceneTables) -> Iterator[Risk]:
             f"section along {direction} ({height:.3g} m from {source}), less than "
             f"{MIN_SLENDERNESS:g}: shear deformation, which Euler-Bernoulli beams neglect, is not "
             "small", "use an elastic body from a mesh", length / height, MIN_SLENDERNESS,
-            before=True,
+            seen_before_run=True,
         )  # fmt: skip
 
 
@@ -271,7 +271,7 @@ def _tangent_frame_warning(body: str, hinge: Hinge) -> Risk:
         "frame", body,
         f'{body}: frame: a tangent frame at "{hinge.outboard_end}", which hinge "{hinge.name}" '
         "leaves free to rotate, has little inertia there: more shapes need smaller steps",
-        'use frame = "auto"', doubt=False, before=True,
+        'use frame = "auto"', invalidates=False, seen_before_run=True,
     )  # fmt: skip
 
 
@@ -294,8 +294,8 @@ def _basis_warnings(scene: SceneTables, beam: Beam) -> Iterator[Risk]:
                     "basis", f'beam "{beam.name}"',
                     f'beam "{beam.name}": basis: {beam.basis} shapes have no bending moment at '
                     f'"{end}", but hinge "{hinge.name}" carries one there, so that they converge '
-                    "slowly", 'use basis = "static+fixed-interface" or "auto"', doubt=False,
-                    before=True,
+                    "slowly", 'use basis = "static+fixed-interface" or "auto"', invalidates=False,
+                    seen_before_run=True,
                 )  # fmt: skip
                 return
 

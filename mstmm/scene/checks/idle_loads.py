@@ -40,7 +40,7 @@ def idle_load_warnings(scene: SceneTables) -> Iterator[Risk]:
                 f'load "{load.name}" acts at the pivot of "{body}" (hinge "{pivot.name}"): its '
                 "force has no effect",
                 f'apply it at an end of the body, or use at = "{MASS_CENTER}"',
-                doubt=False, before=True,
+                invalidates=False, seen_before_run=True,
             )  # fmt: skip
 
 
@@ -82,7 +82,7 @@ def _vector_from_hinge(hinge: Hinge, body: Body, point: Vector) -> Vector:
 def _keeps_point(hinge: Hinge, body: Body, point: Vector) -> bool:
     """Whether a hinge only rotates its outboard body about a given point."""
     facts, motions = hinge.facts, initial_motion_axes(hinge)
-    if facts is None or motions is None or hinge.lets_go:
+    if facts is None or motions is None or hinge.is_released:
         return False
     arm = _vector_from_hinge(hinge, body, point)
     size = max(map(abs, (*point, *body.center_of_mass)), default=0.0)

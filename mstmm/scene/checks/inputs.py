@@ -170,7 +170,7 @@ def switching_term(entry: Expression, names: Collection[str]) -> str:
             dependent_terms.add(number)
         elif any(i in dependent_terms for i in term.args):
             dependent_terms.add(number)
-            if term.op in SWITCHES and number in entry.needed:
+            if term.op in SWITCHES and number in entry.required_terms:
                 return entry.text[term.start : term.end]
     return ""
 
@@ -221,10 +221,14 @@ def unused_input_warnings(scene: SceneTables) -> list[Risk]:
                 name = f'{table} "{element.name}"'
                 warnings.append(
                     Risk(
-                        "unused-input", name, f"{name} is not used",
-                        "use it in an expression, or remove it", doubt=False, before=True,
+                        "unused-input",
+                        name,
+                        f"{name} is not used",
+                        "use it in an expression, or remove it",
+                        invalidates=False,
+                        seen_before_run=True,
                     )
-                )  # fmt: skip
+                )
     return warnings
 
 

@@ -46,7 +46,7 @@ class TreeBody:
 class BodyRow:
     """Row of `count` bodies, each the child of the one before: a single body, or a chain.
 
-    `body`, `hinge` and `place` are those of the first body; the others follow it.  The first is
+    `body`, `hinge` and `position` are those of the first body; the others follow it.  The first is
     connected to `inboard_end` of the scene's body `on` (-1: the ground) at the position `parent`.
     The others are connected to `ends`, repeated.
     """
@@ -54,7 +54,7 @@ class BodyRow:
     body: int
     hinge: int
     count: int
-    place: int
+    position: int
     parent: int
     on: int
     inboard_end: str
@@ -80,14 +80,14 @@ class Topology:
     carried: Mapping[int, int] = field(default_factory=dict)
 
     @property
-    def cut(self) -> tuple[int, ...]:
+    def cut_hinges(self) -> tuple[int, ...]:
         """Indices of the scene's hinges that are not part of the tree."""
         return () if self.plan is None else self.plan.cut
 
     @property
     def count(self) -> int:
         """Number of bodies in the tree."""
-        return self.runs[-1].place + self.runs[-1].count if self.runs else 0
+        return self.runs[-1].position + self.runs[-1].count if self.runs else 0
 
     @cached_property
     def links(self) -> tuple[TreeBody, ...]:
@@ -99,9 +99,9 @@ class Topology:
                 children[parent].append(position)
         return tuple(
             TreeBody(
-                run.body + k, run.hinge + k, parents[run.place + k],
+                run.body + k, run.hinge + k, parents[run.position + k],
                 run.inboard_end if k == 0 else run.ends[(k - 1) % len(run.ends)],
-                run.outboard_end, tuple(children[run.place + k]),
+                run.outboard_end, tuple(children[run.position + k]),
             )
             for run in self.runs
             for k in range(run.count)
@@ -116,7 +116,7 @@ class Topology:
     def parents(self) -> tuple[int, ...]:
         """Position of each link's parent, -1 for the ground."""
         return tuple(
-            run.parent if k == 0 else run.place + k - 1
+            run.parent if k == 0 else run.position + k - 1
             for run in self.runs
             for k in range(run.count)
         )
@@ -124,7 +124,7 @@ class Topology:
     @cached_property
     def position(self) -> tuple[int, ...]:
         """Position in `links` of every body of the scene."""
-        return tuple(map(self.place_of_body, range(self.count + len(self.carried))))
+        return tuple(map(self.position_of_body, range(self.count + len(self.carried))))
 
     @cached_property
     def _by_body(self) -> tuple[list[int], list[BodyRow]]:
@@ -137,17 +137,17 @@ class Topology:
         return [run.hinge for run in runs], runs
 
     @cached_property
-    def _places(self) -> list[int]:
-        return [run.place for run in self.runs]
+    def _run_positions(self) -> list[int]:
+        return [run.position for run in self.runs]
 
-    def place_of_body(self, body: int) -> int:
+    def position_of_body(self, body: int) -> int:
         """Position in the tree of a body of the scene."""
         body = self.carried.get(body, body)
         firsts, runs = self._by_body
         run = runs[bisect_right(firsts, body) - 1]
-        return run.place + body - run.body
+        return run.position + body - run.body
 
-    def place_of_hinge(self, hinge: int) -> int:
+    def position_of_hinge(self, hinge: int) -> int:
         """Position in the tree of the body outboard of a hinge, which must not be cut.
 
         Raises KeyError for the hinge of a carried body.
@@ -156,18 +156,18 @@ class Topology:
         run = runs[bisect_right(firsts, hinge) - 1]
         if not 0 <= hinge - run.hinge < run.count:
             raise KeyError(hinge)
-        return run.place + hinge - run.hinge
+        return run.position + hinge - run.hinge
 
-    def at(self, place: int) -> tuple[int, int]:
+    def scene_indices(self, place: int) -> tuple[int, int]:
         """Scene indices (body, hinge) at a position in the tree."""
-        run = self.runs[bisect_right(self._places, place) - 1]
-        k = place - run.place
+        run = self.runs[bisect_right(self._run_positions, place) - 1]
+        k = place - run.position
         return run.body + k, run.hinge + k
 
     @property
     def roots(self) -> tuple[int, ...]:
         """Positions of the bodies connected to the ground by a hinge."""
-        return tuple(run.place for run in self.runs if run.parent == GROUND)
+        return tuple(run.position for run in self.runs if run.parent == GROUND)
 
 
 def build_topology(scene: SceneTables) -> Topology:
@@ -188,7 +188,7 @@ def inboard_hinges_by_body(scene: SceneTables) -> dict[str, Hinge]:
     """Inboard hinge in the tree by body name, of a scene that has a tree."""
     skeleton = scene.skeleton
     loops = len(skeleton.hinge) > len(skeleton.body)  # every body has at least one
-    cut = set(build_topology(skeleton).cut) if loops else set()
+    cut = set(build_topology(skeleton).cut_hinges) if loops else set()
     return {
         hinge.outboard_body: hinge for number, hinge in enumerate(scene.hinge) if number not in cut
     }
@@ -206,7 +206,7 @@ def _build_if_tree(joints: ConnectivityGraph) -> Topology | None:
     if inboard_edges is None or scene.constraint or scene.coupling:
         if next(tree_messages.problems(joints), None) is not None:
             return None
-        plan = closure_plan(joints.by_bodies())
+        plan = closure_plan(joints.body_mechanism())
         chains = range(len(scene.hinge), len(joints.outboard))
         inboard_edges = [*plan.tree[: len(scene.body)], *chains]
     runs = _body_rows(joints, inboard_edges)

@@ -19,7 +19,7 @@ from .connectivity import ConnectivityGraph
 
 def problems(joints: ConnectivityGraph) -> Iterator[Problem]:
     """Locations and messages of all reasons why there is no spanning tree."""
-    for problem in tree_problems(joints.by_nodes):
+    for problem in tree_problems(joints.node_mechanism):
         yield _tree_problem(joints, problem)
 
 
@@ -35,20 +35,20 @@ def _tree_problem(joints: ConnectivityGraph, one: TreeProblem) -> Problem:
             return _unconnected_problem(joints, one)
         case ConflictingTreeHinges(body, (first, second, *_)):
             return (
-                (*joints.place(second), "cut"),
+                (*joints.scene_location(second), "cut"),
                 f'"{joints.name(body)}" already has the inboard hinge "{joints.edge_name(first)}" '
                 "with cut = false; leave cut out of one of them",
             )
         case AllHingesCut(body, (hinge,)):
             return (
-                (*joints.place(hinge), "cut"),
+                (*joints.scene_location(hinge), "cut"),
                 f'cannot be cut: it is the only inboard hinge of "{joints.name(body)}"; '
                 "leave cut out",
             )
         case AllHingesCut(body, hinges) | Cyclic(body, hinges):
             names = " or ".join(f'"{joints.edge_name(hinge)}"' for hinge in hinges[:4])
             return (
-                (*joints.place(hinges[0]), "cut"),
+                (*joints.scene_location(hinges[0]), "cut"),
                 f'with these cut keys no tree of hinges reaches "{joints.name(body)}"; '
                 f"leave cut out of {names}",
             )

@@ -123,7 +123,7 @@ def _element_problems(
 def _parameter_problems(
     place: Location, given: Mapping[str, float], spec: ElementSpec
 ) -> Iterator[Problem]:
-    type_parameters = spec.parameters if spec.facts is None else spec.facts.own_parameters()
+    type_parameters = spec.parameters if spec.facts is None else spec.facts.extra_parameters()
     parameters_by_name = {p.name: p for p in type_parameters}
     for name, value in given.items():
         value_location = (*place, "parameters", name)
@@ -146,7 +146,7 @@ def _parameter_problems(
     for parameter in type_parameters:
         if parameter.default is None and parameter.name not in given:
             unit = f" in {parameter.unit}" if parameter.unit else ""
-            meaning = f" ({parameter.meaning})" if parameter.meaning else ""
+            meaning = f" ({parameter.description})" if parameter.description else ""
             value_location = (*place, "parameters", parameter.name)
             yield value_location, f"missing; expected a number{unit}{meaning}"
 

@@ -41,7 +41,7 @@ def beam_lines(scene: SceneTables) -> dict[str, BeamLine]:
 
     released = {event.hinge for event in scene.event if event.hinge is not None}
     for hinge in scene.hinge:
-        if hinge.is_weld and not hinge.lets_go and hinge.name not in released:
+        if hinge.is_weld and not hinge.is_released and hinge.name not in released:
             pair = _aligned_beams(hinge, beams)
             if pair is not None:
                 previous_beams[first_beam(pair[1])] = first_beam(pair[0])

@@ -48,7 +48,7 @@ def import_robot(
         raise SceneError(f'mimics: expected "coupled" or "held", found {abbreviate(mimics)}')
     if stops is not None and not _is_stiffness(stops):
         raise SceneError(f"stops: expected a stiffness above 0 in N m/rad or N/m, found {stops!r}")
-    factors = Units.named(units)
+    factors = Units.from_names(units)
     where, content = read_content(path, MAX_FILE_SIZES_MB, "a robot's file")
     absolute_path = Path(os.fsdecode(path)).absolute()
     if absolute_path.suffix.lower() == ".urdf":

@@ -7,13 +7,13 @@ from collections.abc import Collection, Iterator
 
 from ...errors import SceneError
 from ..validators.validation_messages import did_you_mean
-from .robot_model import FIXED, NOTHING, Joint, Link, Robot
+from .robot_model import FIXED, ZERO_MATRIX, Joint, Link, Robot
 
 
 class LinkTree:
     """Tree of the links of a robot.
 
-    `links` and `joints` are by name; `holder` is the inboard joint of a link, `carried` the
+    `links` and `joints` are by name; `holder` is the inboard joint of a link, `outboard_joints` the
     outboard joints of a link; `roots` are the links without an inboard joint.
     """
 
@@ -24,7 +24,7 @@ class LinkTree:
             self.links[link.name] = link
         self.joints: dict[str, Joint] = {}
         self.holder: dict[str, Joint] = {}
-        self.carried: defaultdict[str, list[Joint]] = defaultdict(list)
+        self.outboard_joints: defaultdict[str, list[Joint]] = defaultdict(list)
         for joint in robot.joints:
             _check_unique(self.joints, joint, "joint")
             self.joints[joint.name] = joint
@@ -54,7 +54,7 @@ class LinkTree:
                 f"{self.holder[joint.child].name!r} and of {joint.name!r}; a link has one parent"
             )
         self.holder[joint.child] = joint
-        self.carried[joint.parent].append(joint)
+        self.outboard_joints[joint.parent].append(joint)
 
     def _outward(self) -> Iterator[Link]:
         """Links in tree order, each after its parent."""
@@ -62,14 +62,16 @@ class LinkTree:
         while stack:
             name = stack.pop()
             yield self.links[name]
-            stack += [joint.child for joint in reversed(self.carried[name])]
+            stack += [joint.child for joint in reversed(self.outboard_joints[name])]
 
     def weightless(self) -> list[Joint]:
         """Moving joints without any mass or inertia outboard of them."""
         heavy_links = set[str]()
         for link in reversed(self.outward):
-            has_heavy_child = any(joint.child in heavy_links for joint in self.carried[link.name])
-            if has_heavy_child or link.mass > 0 or link.inertia != NOTHING:
+            has_heavy_child = any(
+                joint.child in heavy_links for joint in self.outboard_joints[link.name]
+            )
+            if has_heavy_child or link.mass > 0 or link.inertia != ZERO_MATRIX:
                 heavy_links.add(link.name)
         return [
             joint for joint in self.joints.values()

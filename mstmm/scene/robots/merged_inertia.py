@@ -8,7 +8,7 @@ from dataclasses import replace
 from ...numerics.pose import IDENTITY_POSE, ZERO, Pose
 from ...numerics.rotations import Matrix, Vector, product, transpose
 from ..validators.inertia import is_rounding
-from .robot_model import NOTHING, ImportNote, Link, Robot
+from .robot_model import ZERO_MATRIX, ImportNote, Link, Robot
 
 
 def merge_inertia(parts: Sequence[tuple[Link, Pose]]) -> tuple[float, Vector, Matrix]:
@@ -20,7 +20,7 @@ def merge_inertia(parts: Sequence[tuple[Link, Pose]]) -> tuple[float, Vector, Ma
         link = parts[0][0]
         return link.mass, link.center, link.inertia
     mass = sum(link.mass for link, _ in parts)
-    mass_centres = [pose.then(Pose(link.center)).position for link, pose in parts]
+    mass_centres = [pose.compose(Pose(link.center)).position for link, pose in parts]
     center = ZERO
     if mass > 0:
         x, y, z = (
@@ -32,7 +32,7 @@ def merge_inertia(parts: Sequence[tuple[Link, Pose]]) -> tuple[float, Vector, Ma
             for i in range(3)
         )
         center = (x, y, z)
-    inertia = NOTHING
+    inertia = ZERO_MATRIX
     for (link, pose), mass_centre in zip(parts, mass_centres, strict=True):
         rotated_inertia = product(product(pose.rotation, link.inertia), transpose(pose.rotation))
         arm = [mass_centre[i] - center[i] for i in range(3)]
@@ -62,7 +62,7 @@ def remove_rounding_inertia(robot: Robot) -> Robot:
     notes = (ImportNote(link.where, f"link {link.name!r}", note_text) for link in affected_links)
     names = {link.name for link in affected_links}
     links = tuple(
-        replace(link, inertia=NOTHING) if link.name in names else link for link in robot.links
+        replace(link, inertia=ZERO_MATRIX) if link.name in names else link for link in robot.links
     )
     return replace(robot, links=links, notes=(*robot.notes, *notes))
 

@@ -22,7 +22,7 @@ from ...numerics.rotations import (
 )
 from ...optional_packages import missing_package_error
 from .mjcf_includes import Locations
-from .robot_model import FIXED, NOTHING, ImportNote, Joint, Link, Mimic, Robot, Visual, color
+from .robot_model import FIXED, ZERO_MATRIX, ImportNote, Joint, Link, Mimic, Robot, Visual, color
 
 _FREE, _BALL, _SLIDE = 0, 1, 2
 _HINGES = ("free", "ball", "prismatic", "pin")
@@ -72,38 +72,40 @@ class _MjcfReader:
     """Reader of a compiled MuJoCo model."""
 
     def __init__(self, mujoco: Any, model: Any, where: str, places: Locations) -> None:
-        self._mujoco, self._m, self._where, self._places = mujoco, model, where, places
+        self._mujoco, self._m, self._file_name, self._locations = mujoco, model, where, places
         self._notes = list[ImportNote]()
         #: Body -> pose of its frame in its link.
         self._frame = {0: IDENTITY_POSE}
 
     def robot(self) -> Robot:
         """Read the robot of the model."""
-        links, joints = [Link("world", where=self._where)], list[Joint]()
+        links, joints = [Link("world", where=self._file_name)], list[Joint]()
         for body in range(1, self._m.nbody):
             for link, joint in self._body(body):
                 links.append(link)
                 joints.append(joint)
         mimics = tuple(self._mimics())
-        visuals = tuple(self._looks())
-        self._leave_out()
+        visuals = tuple(self._visuals())
+        self._note_omissions()
         return Robot(
-            "", self._where, tuple(links), tuple(joints), mimics, visuals, tuple(self._notes),
-            ZERO if self._off("gravity") else _vector(self._m.opt.gravity),
+            "", self._file_name, tuple(links), tuple(joints), mimics, visuals, tuple(self._notes),
+            ZERO if self._is_switched_off("gravity") else _vector(self._m.opt.gravity),
         )  # fmt: skip
 
-    def _off(self, what: str) -> bool:
+    def _is_switched_off(self, what: str) -> bool:
         """Whether a <flag> of the file switches a feature off."""
         flags = (what, "constraint") if what in _CONSTRAINT_FLAGS else (what,)
         bits = (getattr(self._mujoco.mjtDisableBit, f"mjDSBL_{flag.upper()}") for flag in flags)
         return any(self._m.opt.disableflags & int(bit) for bit in bits)
 
-    def _tell(self, element: str, text: str, where: str = "") -> None:
-        self._notes.append(ImportNote(where or self._where, element, text))
+    def _add_note(self, element: str, text: str, where: str = "") -> None:
+        self._notes.append(ImportNote(where or self._file_name, element, text))
 
-    def _at(self, tag: str, name: str, other: str = "") -> str:
+    def _location_of(self, tag: str, name: str, other: str = "") -> str:
         """File and line of a named element with one of two tags; else the file."""
-        return self._places.get((tag, name)) or self._places.get((other, name), self._where)
+        return self._locations.get((tag, name)) or self._locations.get(
+            (other, name), self._file_name
+        )
 
     def _name(self, kind: str, number: int) -> str:
         element_name = self._mujoco.mj_id2name(
@@ -121,11 +123,11 @@ class _MjcfReader:
         parent = int(m.body_parentid[body])
         holder = self._link_of(parent)
         body_pose = Pose(_vector(m.body_pos[body]), _rotation(m.body_quat[body]))
-        pose, previous_anchor = self._frame[parent].then(body_pose), ZERO
+        pose, previous_anchor = self._frame[parent].compose(body_pose), ZERO
         if count == 0:
             self._frame[body] = IDENTITY_POSE
             weld_joint = Joint(
-                f"{name}/weld", FIXED, holder, name, pose, where=self._at("body", name)
+                f"{name}/weld", FIXED, holder, name, pose, where=self._location_of("body", name)
             )
             yield self._mass(body, name), weld_joint
             return
@@ -133,21 +135,21 @@ class _MjcfReader:
             note_text = (
                 f"its {count} joints are hinges in series, with massless bodies between them"
             )
-            self._tell(f"body {name!r}", note_text, self._at("body", name))
+            self._add_note(f"body {name!r}", note_text, self._location_of("body", name))
         for number in range(first_joint, first_joint + count):
             joint_type, is_last = int(m.jnt_type[number]), number == first_joint + count - 1
             joint_anchor = ZERO if joint_type == _FREE else _vector(m.jnt_pos[number])
             joint_pose = (
                 IDENTITY_POSE
                 if joint_type == _FREE
-                else pose.then(Pose(_subtract(joint_anchor, previous_anchor)))
+                else pose.compose(Pose(_subtract(joint_anchor, previous_anchor)))
             )
             joint = self._name("joint", number)
             link_name = name if is_last else f"{name}/{joint}"
-            joint_pose = joint_pose.then(self._back(number, joint_type))
+            joint_pose = joint_pose.compose(self._zero_pose(number, joint_type))
             if is_last:
                 self._frame[body] = Pose(_subtract(ZERO, joint_anchor))
-            where = self._at("joint", joint, "freejoint")
+            where = self._location_of("joint", joint, "freejoint")
             link = self._mass(body, link_name) if is_last else Link(link_name, where=where)
             keys = self._keys(number, joint_type, joint, where)
             yield (
@@ -156,9 +158,9 @@ class _MjcfReader:
             )
             holder, pose, previous_anchor = link_name, IDENTITY_POSE, joint_anchor
         if any(previous_anchor):
-            frame, at_body = f"{name}/frame", self._at("body", name)
+            frame, at_body = f"{name}/frame", self._location_of("body", name)
             note_text = "its origin is at its joint; its original frame is an end"
-            self._tell(f"body {name!r}", note_text, at_body)
+            self._add_note(f"body {name!r}", note_text, at_body)
             weld_joint = Joint(frame, FIXED, name, frame, self._frame[body], where=at_body)
             yield Link(frame, where=at_body), weld_joint
 
@@ -166,17 +168,17 @@ class _MjcfReader:
         """Link with the mass of a body, in the frame of the link."""
         m, frame = self._m, self._frame[body]
         mass = float(m.body_mass[body])
-        where = self._at("body", name)
+        where = self._location_of("body", name)
         if mass == 0 and not m.body_inertia[body].any():
             return Link(name, where=where)
         turn = _rotation(m.body_iquat[body])
         a, b, c = map(float, m.body_inertia[body])
         principal: Matrix = ((a, 0.0, 0.0), (0.0, b, 0.0), (0.0, 0.0, c))
         inertia = product(product(turn, principal), transpose(turn))
-        center = frame.then(Pose(_vector(m.body_ipos[body]))).position
-        return Link(name, mass, center, inertia if any((a, b, c)) else NOTHING, where)
+        center = frame.compose(Pose(_vector(m.body_ipos[body]))).position
+        return Link(name, mass, center, inertia if any((a, b, c)) else ZERO_MATRIX, where)
 
-    def _back(self, number: int, kind: int) -> Pose:
+    def _zero_pose(self, number: int, kind: int) -> Pose:
         """Pose of a joint at 0 relative to its reference value."""
         if kind in (_FREE, _BALL):
             return IDENTITY_POSE
@@ -198,26 +200,28 @@ class _MjcfReader:
         dof_end, value_end = dof + (6, 3, 1, 1)[kind], first_value + (7, 4, 1, 1)[kind]
         law: dict[str, Any] = {}
         for key, numbers in (("damping", m.dof_damping), ("inertia", m.dof_armature)):
-            if key == "damping" and self._off("damper"):
+            if key == "damping" and self._is_switched_off("damper"):
                 continue
             if (values_found := [float(x) for x in numbers[dof:dof_end]]) and any(values_found):
                 law[key] = values_found
-        self._tell_of_curves(number, dof, joint, where)
+        self._note_nonlinear_terms(number, dof, joint, where)
         friction_losses = [float(x) for x in m.dof_frictionloss[dof:dof_end]]
-        if any(friction_losses) and not self._off("frictionloss"):
+        if any(friction_losses) and not self._is_switched_off("frictionloss"):
             law["friction"] = [{"coulomb": x} for x in friction_losses]
             if kind == _FREE:
                 text = "its friction acts along the axes of the body, in MuJoCo along world axes"
-                self._tell(f"joint {joint!r}", text, where)
-        stiffness = 0.0 if self._off("spring") else float(m.jnt_stiffness[number].flat[0])
+                self._add_note(f"joint {joint!r}", text, where)
+        stiffness = (
+            0.0 if self._is_switched_off("spring") else float(m.jnt_stiffness[number].flat[0])
+        )
         if stiffness and kind in (_FREE, _BALL):
             text = "its spring is left out; define it in the law of the hinge"
-            self._tell(f"joint {joint!r}", text, where)
+            self._add_note(f"joint {joint!r}", text, where)
         elif stiffness:
             law |= {"stiffness": stiffness, "rest": float(m.qpos_spring[first_value])}
-        if m.jnt_limited[number] and not self._off("limit"):
+        if m.jnt_limited[number] and not self._is_switched_off("limit"):
             if kind == _BALL:
-                self._tell(f"joint {joint!r}", "its limit is left out", where)
+                self._add_note(f"joint {joint!r}", "its limit is left out", where)
             else:
                 lower, upper = map(float, m.jnt_range[number])
                 law["limits"] = {"lower": lower, "upper": upper}
@@ -231,24 +235,24 @@ class _MjcfReader:
         if m.jnt_actfrclimited[number]:
             lower_force, upper_force = map(float, m.jnt_actfrcrange[number])
             text = f"actuatorfrcrange from {lower_force:g} to {upper_force:g} left out"
-            self._tell(f"joint {joint!r}", text, where)
+            self._add_note(f"joint {joint!r}", text, where)
         start = [float(x) for x in m.qpos0[first_value:value_end]]
         return keys | ({"initial": {"q": start}} if any(start) else {})
 
-    def _tell_of_curves(self, number: int, dof: int, joint: str, where: str) -> None:
+    def _note_nonlinear_terms(self, number: int, dof: int, joint: str, where: str) -> None:
         """Add notes about nonlinear terms of springs and dampers, where MuJoCo has them."""
         for feature, key, index in (
             ("spring", "jnt_stiffness", number),
             ("damper", "dof_damping", dof),
         ):
             terms = getattr(self._m, f"{key}poly", None)
-            if terms is not None and terms[index].any() and not self._off(feature):
+            if terms is not None and terms[index].any() and not self._is_switched_off(feature):
                 text = f"the nonlinear terms of its {feature} are left out"
-                self._tell(f"joint {joint!r}", text, where)
+                self._add_note(f"joint {joint!r}", text, where)
 
     def _mimics(self) -> Iterator[Mimic]:
         """Active joint equalities that are linear."""
-        m, is_disabled = self._m, self._off("equality")
+        m, is_disabled = self._m, self._is_switched_off("equality")
         for number in range(m.neq):
             if is_disabled or not m.eq_active0[number]:
                 self._leave_equality(number, "left out: switched off")
@@ -273,9 +277,11 @@ class _MjcfReader:
     def _leave_equality(self, number: int, what: str = "left out") -> None:
         name, type_enum = self._name("equality", number), self._mujoco.mjtEq
         type_name = type_enum(int(self._m.eq_type[number])).name.removeprefix("mjEQ_").lower()
-        self._tell(f"equality {name!r} ({type_name})", what, self._at("equality", name))
+        self._add_note(
+            f"equality {name!r} ({type_name})", what, self._location_of("equality", name)
+        )
 
-    def _looks(self) -> Iterator[Visual]:
+    def _visuals(self) -> Iterator[Visual]:
         m, geom_types, undrawn_count = self._m, self._mujoco.mjtGeom, 0
         for number in range(m.ngeom):
             if (
@@ -292,27 +298,29 @@ class _MjcfReader:
             body = int(m.geom_bodyid[number])
             geom_pose = Pose(_vector(m.geom_pos[number]), _rotation(m.geom_quat[number]))
             keys["color"] = color(m.geom_rgba[number][:3])
-            yield Visual(self._link_of(body), self._frame[body].then(geom_pose), keys)
+            yield Visual(self._link_of(body), self._frame[body].compose(geom_pose), keys)
         if undrawn_count:
-            self._tell(
+            self._add_note(
                 "geom", f"{undrawn_count} of them are not drawn (meshes, ellipsoids, heights)"
             )
 
-    def _leave_out(self) -> None:
+    def _note_omissions(self) -> None:
         m = self._m
         for key, description in _COUNTED_UNSUPPORTED.items():
             if count := int(getattr(m, key, 0)):
-                self._tell(description, f"left out, {count} of them")
+                self._add_note(description, f"left out, {count} of them")
         for description, (key, section) in _NAMED_UNSUPPORTED.items():
             for number in range(int(getattr(m, key, 0))):
                 name = self._name(description, number)
-                self._tell(f"{description} {name!r}", "left out", self._at(section, name))
+                self._add_note(
+                    f"{description} {name!r}", "left out", self._location_of(section, name)
+                )
         if m.ngeom and (m.geom_contype.any() or m.geom_conaffinity.any()):
-            self._tell("contacts", "left out: bodies pass through each other and the ground")
+            self._add_note("contacts", "left out: bodies pass through each other and the ground")
         if m.body_gravcomp.any():
-            self._tell("gravcomp", "left out")
+            self._add_note("gravcomp", "left out")
         if m.opt.density > 0 or m.opt.viscosity > 0:
-            self._tell("fluid", "fluid forces are left out")
+            self._add_note("fluid", "fluid forces are left out")
 
 
 def _shape_keys(kinds: Any, kind: int, size: list[float]) -> dict[str, Any] | None:

@@ -17,9 +17,9 @@ class NameRegistry:
     """Registry that gives each name of a file a unique valid name in the scene."""
 
     def __init__(self) -> None:
-        self._taken = {GROUND}
+        self._used_names = {GROUND}
 
-    def take_all(
+    def register_all(
         self, names: Iterable[str], instead: str, others: Iterable[str] = ()
     ) -> dict[str, str]:
         """Register several names: scene names by file names.
@@ -29,11 +29,11 @@ class NameRegistry:
         file_names, scene_names = list(names), dict[str, str]()
         for keep_valid in (True, False):
             selected_names = [name for name in file_names if _is_valid_name(name) == keep_valid]
-            scene_names |= {name: self.take(name, instead) for name in selected_names}
-            self._taken.update(others)
+            scene_names |= {name: self.register(name, instead) for name in selected_names}
+            self._used_names.update(others)
         return {name: scene_names[name] for name in file_names}
 
-    def take(self, name: str, instead: str) -> str:
+    def register(self, name: str, instead: str) -> str:
         """Register a name: invalid characters become _, and the result is made unique.
 
         `instead` is the prefix of names that do not begin with a letter.
@@ -42,10 +42,10 @@ class NameRegistry:
         if not base_name[:1].isalpha():
             base_name = f"{instead}_{base_name}".rstrip("_")
         unique_name, count = base_name, 1
-        while unique_name in self._taken:
+        while unique_name in self._used_names:
             count += 1
             unique_name = f"{base_name}_{count}"
-        self._taken.add(unique_name)
+        self._used_names.add(unique_name)
         return unique_name
 
 

@@ -80,13 +80,13 @@ class _SceneReader:
         _check_supported(scene)
         self.bodies = {body.name: body for body in scene.bodies}
         #: Names of a robot file by body, end or ground of the scene.
-        self.named = _names_by_scene_name(scene.names.body)
+        self.link_names = _names_by_scene_name(scene.names.body)
         self.joints = {
             scene_name: names[0]
             for scene_name, names in _names_by_scene_name(scene.names.hinge).items()
         }
         links = [*map(self._link_name, self.bodies), *scene.names.body]
-        self.world = self.named.get(GROUND, [GROUND if "world" in links else "world"])[0]
+        self.world = self.link_names.get(GROUND, [GROUND if "world" in links else "world"])[0]
         outboard_ends = {hinge.outboard_body: hinge.outboard_end for hinge in scene.hinges}
         #: Frame of the link of each body in the axes of the body.
         self.frames = {
@@ -95,14 +95,14 @@ class _SceneReader:
         #: Ends that are not only the position of a joint.
         self.ends = [
             (body.name, end) for body in scene.bodies for end in body.ends
-            if f"{body.name}.{end}" in self.named
-            or (end != outboard_ends.get(body.name) and not self._is_of_joint(body.name, end))
+            if f"{body.name}.{end}" in self.link_names
+            or (end != outboard_ends.get(body.name) and not self._has_hinge_name(body.name, end))
         ]  # fmt: skip
-        self._once = Counter([*dict.fromkeys(links), *(end for _, end in self.ends)])
-        self._taken = {self.world, *self._once}
+        self._name_counts = Counter([*dict.fromkeys(links), *(end for _, end in self.ends)])
+        self._used_names = {self.world, *self._name_counts}
 
     def robot(self, name: str) -> Robot:
-        ends = [self._end_link(*coupling_or_end) for coupling_or_end in self._fixed()]
+        ends = [self._end_link(*coupling_or_end) for coupling_or_end in self._fixed_links()]
         links = (
             Link(self.world),
             *map(self._link, self.bodies.values()),
@@ -114,48 +114,48 @@ class _SceneReader:
             for coupling_or_end in self.scene.coupling
             if (mimic_or_link := self._mimic(coupling_or_end))
         )
-        visuals = tuple(self._look(shape) for shape in self.scene.shape if self._is_drawn(shape))
-        self._tell_rest()
+        visuals = tuple(self._visual(shape) for shape in self.scene.shape if self._is_drawn(shape))
+        self._note_table_omissions()
         return Robot(name, name, links, joints, mimics, visuals, tuple(self.notes))
 
     def _link_name(self, body: str) -> str:
-        return self.world if body == GROUND else self.named.get(body, [body])[0]
+        return self.world if body == GROUND else self.link_names.get(body, [body])[0]
 
     def _joint_name(self, hinge: str) -> str:
         return self.joints.get(hinge, hinge)
 
-    def _fixed(self) -> Iterator[tuple[str, str, str]]:
+    def _fixed_links(self) -> Iterator[tuple[str, str, str]]:
         """Body, end and name of the links on fixed joints."""
         for body, end in self.ends:
-            names = self.named.get(f"{body}.{end}") or [self._end_name(body, end)]
+            names = self.link_names.get(f"{body}.{end}") or [self._end_name(body, end)]
             yield from ((body, end, name) for name in names)
         for body in (GROUND, *self.bodies):
-            yield from ((body, "", name) for name in self.named.get(body, ())[1:])
+            yield from ((body, "", name) for name in self.link_names.get(body, ())[1:])
 
     def _end_name(self, body: str, end: str) -> str:
-        if self._once[end] == 1 and end != self.world:
+        if self._name_counts[end] == 1 and end != self.world:
             return end
         name = f"{self._link_name(body)}_{end}"
-        while name in self._taken:
+        while name in self._used_names:
             name += "_"
-        self._taken.add(name)
+        self._used_names.add(name)
         return name
 
     def _note(self, element: str, text: str) -> None:
         self.notes.append(ImportNote("scene", element, text))
 
-    def _is_of_joint(self, body: str, end: str) -> bool:
+    def _has_hinge_name(self, body: str, end: str) -> bool:
         """Whether an end has the name of its hinge, as imported scenes have."""
         return any(h.name == end and h.inboard == f"{body}.{end}" for h in self.scene.hinges)
 
-    def _in_link(self, body: str, pose: Pose) -> Pose:
+    def _to_link_axes(self, body: str, pose: Pose) -> Pose:
         """Convert a frame of a body to the axes of its link."""
         frame = self.frames[body]
-        return pose if frame == IDENTITY_POSE else frame.inverse.then(pose)
+        return pose if frame == IDENTITY_POSE else frame.inverse.compose(pose)
 
     def _link(self, body: Body) -> Link:
         frame, inertia = self.frames[body.name], body.inertia_matrix
-        center = self._in_link(body.name, Pose(body.center_of_mass)).position
+        center = self._to_link_axes(body.name, Pose(body.center_of_mass)).position
         if frame.rotation != IDENTITY_POSE.rotation:
             inertia = product(product(transpose(frame.rotation), inertia), frame.rotation)
         return Link(self._link_name(body.name), body.mass, center, inertia)
@@ -163,7 +163,7 @@ class _SceneReader:
     def _end_link(self, body: str, end: str, name: str) -> tuple[Link, Joint]:
         end_frame = IDENTITY_POSE
         if body != GROUND:
-            end_frame = self._in_link(body, _end_pose(self.bodies[body], end))
+            end_frame = self._to_link_axes(body, _end_pose(self.bodies[body], end))
         joint, holder = self._free_name(f"{name}_fixed"), self._link_name(body)
         return Link(name), Joint(joint, FIXED, holder, name, end_frame)
 
@@ -177,17 +177,19 @@ class _SceneReader:
     def _joint(self, hinge: Hinge) -> Joint:
         hinge_pose = Pose(rotation=hinge.rotation)
         if hinge.inboard_body == GROUND:
-            pose = Pose(hinge.position).then(hinge_pose)
+            pose = Pose(hinge.position).compose(hinge_pose)
         else:
             holder = self.bodies[hinge.inboard_body]
-            pose = self._in_link(holder.name, _end_pose(holder, hinge.inboard_end)).then(hinge_pose)
-        self._tell_hinge(hinge)
+            pose = self._to_link_axes(holder.name, _end_pose(holder, hinge.inboard_end)).compose(
+                hinge_pose
+            )
+        self._note_hinge_omissions(hinge)
         parent, child = map(self._link_name, (hinge.inboard_body, hinge.outboard_body))
         return Joint(
             self._joint_name(hinge.name), hinge.type, parent, child, pose, _joint_keys(hinge)
         )
 
-    def _tell_hinge(self, hinge: Hinge) -> None:
+    def _note_hinge_omissions(self, hinge: Hinge) -> None:
         facts, element = hinge.facts, f"hinge {hinge.name!r}"
         assert facts is not None
         has_one_speed = len(facts.speeds) == 1
@@ -219,15 +221,15 @@ class _SceneReader:
         if mimic is None:
             self._note(f"coupling {coupling.name!r}", "left out: not a linear mimic of two joints")
             return None
-        own_joint, other_joint = self._joint_name(mimic.of), self._joint_name(mimic.other)
-        return replace(mimic, of=own_joint, other=other_joint)
+        own_joint, other_joint = self._joint_name(mimic.follower), self._joint_name(mimic.leader)
+        return replace(mimic, follower=own_joint, leader=other_joint)
 
     def _is_drawn(self, shape: Shape) -> bool:
         if shape.type not in _SUPPORTED_SHAPES:
             self._note(f"shape on {shape.on!r}", f"left out: URDF has no {shape.type}")
         return shape.type in _SUPPORTED_SHAPES
 
-    def _look(self, shape: Shape) -> Visual:
+    def _visual(self, shape: Shape) -> Visual:
         pose = Pose(shape.position, shape.rotation)
         keys = {
             key: value for key in ("type", "size", "radius", "length", "file", "scale", "color")
@@ -236,10 +238,10 @@ class _SceneReader:
         body, _, end = shape.on.partition(".")
         if body == GROUND:
             return Visual(self.world, pose, keys)
-        link_pose = self._in_link(body, _end_pose(self.bodies[body], end)).then(pose)
+        link_pose = self._to_link_axes(body, _end_pose(self.bodies[body], end)).compose(pose)
         return Visual(self._link_name(body), link_pose, keys)
 
-    def _tell_rest(self) -> None:
+    def _note_table_omissions(self) -> None:
         for table in _UNSUPPORTED_TABLES:
             if count := len(getattr(self.scene, table)):
                 self._note(
@@ -278,7 +280,7 @@ def _check_supported(scene: Scene) -> None:
                 f'hinge "{hinge.name}": URDF has no joint like a {hinge.type} hinge; use pins '
                 "and slides in series, with massless bodies between them"
             )
-    if cut := [scene.hinge[number] for number in build_topology(scene).cut]:
+    if cut := [scene.hinge[number] for number in build_topology(scene).cut_hinges]:
         raise SceneError(_loop_message(scene, cut))
 
 

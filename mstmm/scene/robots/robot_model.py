@@ -10,7 +10,7 @@ from ...numerics.pose import IDENTITY_POSE, ZERO, Pose
 from ...numerics.rotations import Matrix, Vector
 
 FIXED = "fixed"
-NOTHING: Matrix = (ZERO, ZERO, ZERO)
+ZERO_MATRIX: Matrix = (ZERO, ZERO, ZERO)
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class Link:
     name: str
     mass: float = 0.0
     center: Vector = ZERO
-    inertia: Matrix = NOTHING
+    inertia: Matrix = ZERO_MATRIX
     where: str = ""
 
 
@@ -44,10 +44,10 @@ class Joint:
 
 @dataclass(frozen=True)
 class Mimic:
-    """Mimic relation of the joint `of` to another one: q = multiplier q_other + offset."""
+    """Mimic relation of the joint `follower` to another one: q = multiplier q_other + offset."""
 
-    of: str
-    other: str
+    follower: str
+    leader: str
     multiplier: float
     offset: float
 
@@ -87,6 +87,6 @@ class Robot:
     links: tuple[Link, ...]
     joints: tuple[Joint, ...]
     mimics: tuple[Mimic, ...] = ()
-    looks: tuple[Visual, ...] = ()
+    visuals: tuple[Visual, ...] = ()
     notes: tuple[ImportNote, ...] = ()
     gravity: Vector = (0.0, 0.0, -9.81)

@@ -21,7 +21,7 @@ from .link_tree import LinkTree
 from .merged_inertia import merge_inertia, remove_rounding_inertia
 from .mesh_paths import MeshFinder
 from .name_mapping import NameRegistry, reference_names
-from .robot_model import FIXED, NOTHING, ImportNote, Joint, Link, Mimic, Robot
+from .robot_model import FIXED, ZERO_MATRIX, ImportNote, Joint, Link, Mimic, Robot
 from .unit_conversion import unit_notes
 
 BASES = (FIXED, "free")
@@ -46,7 +46,7 @@ class ImportOptions:
 
     base: str = FIXED
     merge: bool = True
-    stops: float | None = None
+    stop_stiffness: float | None = None
     mimics: str = COUPLED
 
 
@@ -105,40 +105,40 @@ class _SceneWriter:
             )
             text = f"{len(tree.roots)} of them: {names_text}; each has its own base"
             self.notes.append(ImportNote(robot.where, "trees", text))
-        valid_mimics = list(self._known_mimics())
-        mimics = list({mimic.of: mimic for mimic in valid_mimics}.values())
+        valid_mimics = list(self._valid_mimics())
+        mimics = list({mimic.follower: mimic for mimic in valid_mimics}.values())
         for mimic in valid_mimics:
             if mimic not in mimics:
-                note_text = f"several <mimic>: the last one applies, not {mimic.other!r}"
-                self._tell(tree.joints[mimic.of], f"joint {mimic.of!r}", note_text)
-        self.held = {joint.name for joint in tree.weightless()}
-        for name in sorted(self.held, key=list(tree.joints).index):
+                note_text = f"several <mimic>: the last one applies, not {mimic.leader!r}"
+                self._add_note(tree.joints[mimic.follower], f"joint {mimic.follower!r}", note_text)
+        self.fixed_joints = {joint.name for joint in tree.weightless()}
+        for name in sorted(self.fixed_joints, key=list(tree.joints).index):
             note_text = "fixed, because no link outboard of it has mass"
-            self._tell(tree.joints[name], f"joint {name!r}", note_text)
+            self._add_note(tree.joints[name], f"joint {name!r}", note_text)
         #: Link -> the link whose body it is part of, or _STILL, and its frame in that body.
-        self.place = dict[str, tuple[str, Pose]]()
+        self.body_frames = dict[str, tuple[str, Pose]]()
         for link in tree.outward:
-            self.place[link.name] = self._placed(link)
+            self.body_frames[link.name] = self._owner_and_pose(link)
         self._names = NameRegistry()
-        self._bodies = self._names.take_all(self.bodies(), "link", tree.links)
+        self._bodies = self._names.register_all(self.bodies(), "link", tree.links)
         hinges = NameRegistry()
         moving_joints = [
             robot_joint.name
             for robot_joint in robot.joints
-            if self.place[robot_joint.child][0] == robot_joint.child
+            if self.body_frames[robot_joint.child][0] == robot_joint.child
         ]
-        self.joints = hinges.take_all(moving_joints, "joint")
+        self.joints = hinges.register_all(moving_joints, "joint")
         #: Position of the notes on names, which are written when all ends are defined.
-        self._told = len(self.notes)
-        self._tell_links()
+        self._name_note_index = len(self.notes)
+        self._add_link_notes()
         #: Mimic relations of the moving joints by name.
-        self.mimics = {mimic.of: mimic for mimic in mimics if self._moves(mimic.of)}
-        self._roots = {name: hinges.take(f"{name}_base", "link")
+        self.mimics = {mimic.follower: mimic for mimic in mimics if self._is_moving(mimic.follower)}
+        self._roots = {name: hinges.register(f"{name}_base", "link")
                        for name in tree.roots if name in self._bodies}  # fmt: skip
         self._ends: defaultdict[str, dict[str, Any]] = defaultdict(dict)
         self.links = {link.name: self._frame(link) for link in robot.links}
 
-    def _tell_names(self, names: Mapping[str, Mapping[str, str]]) -> None:
+    def _add_name_notes(self, names: Mapping[str, Mapping[str, str]]) -> None:
         """Add notes about links and joints that are renamed in the scene.
 
         `names` are the original names that its [names] keeps.
@@ -161,25 +161,29 @@ class _SceneWriter:
                     ", ..." if renames[_MAX_NAMES_IN_NOTE:] else ""
                 )
                 text = f"{len(renames)} {description}: {names_text}"
-                self.notes.insert(self._told, ImportNote(self.robot.where, "names", text))
+                self.notes.insert(
+                    self._name_note_index, ImportNote(self.robot.where, "names", text)
+                )
 
-    def _tell_links(self) -> None:
+    def _add_link_notes(self) -> None:
         """Add notes about links that are no separate bodies, and about moving massless links."""
         for link in self.robot.links:
-            joint, (owner, _) = self.tree.holder.get(link.name), self.place[link.name]
+            joint, (owner, _) = self.tree.holder.get(link.name), self.body_frames[link.name]
             if joint is None:
                 continue
             if owner == _GROUND_OWNER:
-                self._tell(joint, f"link {link.name!r}", "part of the ground")
+                self._add_note(joint, f"link {link.name!r}", "part of the ground")
             elif owner != link.name:
                 note_text = "part of its inboard body; its name refers to its frame there"
-                self._tell(joint, f"link {link.name!r}", note_text)
-            elif joint.type != FIXED and not link.mass and link.inertia == NOTHING:
-                self._tell(link, f"link {link.name!r}", "moves without mass")
+                self._add_note(joint, f"link {link.name!r}", note_text)
+            elif joint.type != FIXED and not link.mass and link.inertia == ZERO_MATRIX:
+                self._add_note(link, f"link {link.name!r}", "moves without mass")
 
     def bodies(self) -> list[str]:
         """Names of links that are separate bodies, in the order of the file."""
-        return [link.name for link in self.robot.links if self.place[link.name][0] == link.name]
+        return [
+            link.name for link in self.robot.links if self.body_frames[link.name][0] == link.name
+        ]
 
     def tables(self, folder: Path | None) -> dict[str, Any]:
         """Keys of the scene."""
@@ -187,7 +191,7 @@ class _SceneWriter:
         scene_keys["hinge"] = [*map(self._root, self._roots), *self._joints()]
         parts_by_owner: defaultdict[str, list[tuple[Link, Pose]]] = defaultdict(list)
         for link in self.robot.links:
-            owner, pose = self.place[link.name]
+            owner, pose = self.body_frames[link.name]
             parts_by_owner[owner].append((link, pose))
         scene_keys["body"] = [self._body(name, parts_by_owner[name]) for name in self._bodies]
         if couplings := list(self._couplings()):
@@ -197,7 +201,7 @@ class _SceneWriter:
         ends = {f"{self._bodies[name]}.{end}" for name in self._ends for end in self._ends[name]}
         own_references = {GROUND, *self._bodies.values(), *ends}
         names = reference_names(self._named_links(), self.joints, own_references)
-        self._tell_names(names)
+        self._add_name_notes(names)
         if names:
             scene_keys["names"] = names
         return scene_keys
@@ -206,27 +210,29 @@ class _SceneWriter:
         """Bodies and ends by link name, bodies first; on the ground only links at its origin."""
         bodies = dict.fromkeys((*self._bodies, *self.links))
         return {
-            name: self.links[name] for name in bodies
-            if self.place[name] == (_GROUND_OWNER, IDENTITY_POSE) or self.links[name] != GROUND
-        }  # fmt: skip
+            name: self.links[name]
+            for name in bodies
+            if self.body_frames[name] == (_GROUND_OWNER, IDENTITY_POSE)
+            or self.links[name] != GROUND
+        }
 
-    def _tell(self, one: Link | Joint, element: str, text: str) -> None:
+    def _add_note(self, one: Link | Joint, element: str, text: str) -> None:
         self.notes.append(ImportNote(one.where, element, text))
 
-    def _placed(self, link: Link) -> tuple[str, Pose]:
+    def _owner_and_pose(self, link: Link) -> tuple[str, Pose]:
         joint = self.tree.holder.get(link.name)
         if joint is None:
-            empty = link.mass == 0 and link.inertia == NOTHING
+            empty = link.mass == 0 and link.inertia == ZERO_MATRIX
             grounded = self.choices.base == FIXED and (empty or self.choices.merge)
             return (_GROUND_OWNER if grounded else link.name), IDENTITY_POSE
-        if self.choices.merge and (joint.type == FIXED or joint.name in self.held):
-            owner, pose = self.place[joint.parent]
-            return owner, pose.then(joint.pose)
+        if self.choices.merge and (joint.type == FIXED or joint.name in self.fixed_joints):
+            owner, pose = self.body_frames[joint.parent]
+            return owner, pose.compose(joint.pose)
         return link.name, IDENTITY_POSE
 
     def _frame(self, link: Link) -> str:
         """Reference of the body or end of a link."""
-        owner, pose = self.place[link.name]
+        owner, pose = self.body_frames[link.name]
         if owner == _GROUND_OWNER:
             return GROUND
         return self._end(owner, pose, link.name)
@@ -242,8 +248,8 @@ class _SceneWriter:
                 return f"{body}.{end_name}"
         names = NameRegistry()
         for end_name in ends:
-            names.take(end_name, "end")
-        new_name = names.take(name, "end")
+            names.register(end_name, "end")
+        new_name = names.register(name, "end")
         ends[new_name] = end
         return f"{body}.{new_name}"
 
@@ -252,7 +258,7 @@ class _SceneWriter:
         table: dict[str, Any] = {"name": self._bodies[name], "mass": mass}
         if any(center):
             table["center_of_mass"] = center
-        if inertia != NOTHING:
+        if inertia != ZERO_MATRIX:
             table["inertia"] = (
                 inertia[0][0],
                 inertia[1][1],
@@ -263,7 +269,7 @@ class _SceneWriter:
             )
             if message := triangle_message(inertia):
                 table["allow_unphysical_inertia"] = True
-                self._tell(parts[0][0], f"link {name!r}", f"accepted unchanged: {message}")
+                self._add_note(parts[0][0], f"link {name!r}", f"accepted unchanged: {message}")
         if self._ends[name]:
             table["ends"] = self._ends[name]
         return table
@@ -273,12 +279,12 @@ class _SceneWriter:
         return {"name": hinge, "type": self.choices.base, "inboard": GROUND, "outboard": body}
 
     def _joints(self) -> Iterator[dict[str, Any]]:
-        start = self._starts()
+        start = self._initial_values()
         for name, hinge in self.joints.items():
             joint = self.tree.joints[name]
-            is_held = joint.name in self.held
-            owner, frame = self.place[joint.parent]
-            pose, grounded = frame.then(joint.pose), owner == _GROUND_OWNER
+            is_held = joint.name in self.fixed_joints
+            owner, frame = self.body_frames[joint.parent]
+            pose, grounded = frame.compose(joint.pose), owner == _GROUND_OWNER
             yield {
                 "name": hinge,
                 "type": FIXED if is_held else joint.type,
@@ -294,58 +300,58 @@ class _SceneWriter:
         if mass := keys.pop("armature", 0.0):
             law["effort"] = _inertial_mass_efforts(self.joints[joint.name], mass)
         if limits := law.pop("limits", None):
-            if self.choices.stops is None:
-                self._tell(
+            if self.choices.stop_stiffness is None:
+                self._add_note(
                     joint,
                     f"joint {joint.name!r}",
                     "its limits are not stops; they are kept as rated",
                 )
             else:
-                law["limits"] = {**limits, "stiffness": self.choices.stops}
+                law["limits"] = {**limits, "stiffness": self.choices.stop_stiffness}
         if law:
             keys["law"] = law
         if start is not None and not self._is_coupled(joint.name):
             keys["drive"] = [start]
             keys.pop("initial", None)
-            self._tell(joint, f"joint {joint.name!r}", f"held at {start:g}; it mimics another")
+            self._add_note(joint, f"joint {joint.name!r}", f"held at {start:g}; it mimics another")
         elif start is not None and (start or "initial" in keys):
             keys["initial"] = {"q": [start]}
         return keys
 
-    def _known_mimics(self) -> Iterator[Mimic]:
+    def _valid_mimics(self) -> Iterator[Mimic]:
         for mimic in self.robot.mimics:
-            other_joint = self.tree.joints.get(mimic.other)
+            other_joint = self.tree.joints.get(mimic.leader)
             if other_joint is not None and other_joint.type in (*_SINGLE_COORDINATE_TYPES, FIXED):
                 yield mimic
                 continue
-            note_text = f"left free: it mimics {mimic.other!r}, which "
+            note_text = f"left free: it mimics {mimic.leader!r}, which "
             if other_joint is None:
-                note_text += f"does not exist{did_you_mean(mimic.other, self.tree.joints)}"
+                note_text += f"does not exist{did_you_mean(mimic.leader, self.tree.joints)}"
             else:
                 note_text += "has more than one coordinate"
-            self._tell(self.tree.joints[mimic.of], f"joint {mimic.of!r}", note_text)
+            self._add_note(self.tree.joints[mimic.follower], f"joint {mimic.follower!r}", note_text)
 
     def _couplings(self) -> Iterator[dict[str, Any]]:
         for name, mimic in self.mimics.items():
             if not self._is_coupled(name):
                 continue
-            own_hinge, other_hinge = self.joints[name], self.joints[mimic.other]
+            own_hinge, other_hinge = self.joints[name], self.joints[mimic.leader]
             row = f"{own_hinge}.q - {mimic.multiplier!r}*{other_hinge}.q".replace("- -", "+ ")
             yield {"name": f"{own_hinge}_mimics", "expression": row, "equals": mimic.offset}
-            note_text = f"mimics {mimic.other!r}, by a coupling"
-            self._tell(self.tree.joints[name], f"joint {name!r}", note_text)
+            note_text = f"mimics {mimic.leader!r}, by a coupling"
+            self._add_note(self.tree.joints[name], f"joint {name!r}", note_text)
 
-    def _moves(self, name: str) -> bool:
+    def _is_moving(self, name: str) -> bool:
         is_fixed = self.tree.joints[name].type == FIXED
-        return not is_fixed and name in self.joints and name not in self.held
+        return not is_fixed and name in self.joints and name not in self.fixed_joints
 
     def _is_coupled(self, name: str) -> bool:
         """Whether a joint that mimics another one is coupled to it; else it is held."""
         mimic = self.mimics[name]
-        follows = mimic.multiplier != 0 and self._moves(mimic.other)
+        follows = mimic.multiplier != 0 and self._is_moving(mimic.leader)
         return self.choices.mimics == COUPLED and follows
 
-    def _starts(self) -> dict[str, float]:
+    def _initial_values(self) -> dict[str, float]:
         """Initial values of the joints that mimic others.  Raises SceneError for cycles."""
         mimics, start_values = self.mimics, dict[str, float]()
         for name in mimics:
@@ -358,29 +364,31 @@ class _SceneWriter:
                         "remove one <mimic> of the cycle"
                     )
                 mimic_path[name] = mimics[name]
-                name = mimics[name].other
-            start_value = start_values[name] if name in start_values else self._start(name)
+                name = mimics[name].leader
+            start_value = start_values[name] if name in start_values else self._initial_value(name)
             for joint_name, mimic in reversed(mimic_path.items()):
                 start_value = start_values[joint_name] = (
                     mimic.multiplier * start_value + mimic.offset
                 )
         return start_values
 
-    def _start(self, name: str) -> float:
+    def _initial_value(self, name: str) -> float:
         """Initial value of a joint that mimics no other."""
-        initial_values = self.tree.joints[name].keys.get("initial") if self._moves(name) else None
+        initial_values = (
+            self.tree.joints[name].keys.get("initial") if self._is_moving(name) else None
+        )
         return float(initial_values["q"][0]) if initial_values else 0.0
 
     def _shapes(self, folder: Path | None) -> Iterator[dict[str, Any]]:
         meshes = None if folder is None else MeshFinder(folder)
-        for visual in self.robot.looks:
-            owner, frame = self.place[visual.link]
-            pose, keys = frame.then(visual.pose), dict(visual.keys)
+        for visual in self.robot.visuals:
+            owner, frame = self.body_frames[visual.link]
+            pose, keys = frame.compose(visual.pose), dict(visual.keys)
             if file := keys.get("file"):
                 mesh_path = None if meshes is None else meshes.path(file)
                 if mesh_path is None:
                     link = self.tree.links[visual.link]
-                    self._tell(
+                    self._add_note(
                         link, f"link {visual.link!r}", f"not drawn: there is no mesh {file!r}"
                     )
                     continue

@@ -36,7 +36,7 @@ class Units(NamedTuple):
     mass: float = 1.0
 
     @classmethod
-    def named(cls, given: Mapping[str, str] | None) -> Units:
+    def from_names(cls, given: Mapping[str, str] | None) -> Units:
         """Create from names such as {"length": "mm", "mass": "g"}; the default is m and kg.
 
         Raises SceneError.
@@ -51,7 +51,7 @@ class Units(NamedTuple):
                 raise SceneError(f"units: {key}: expected one of {known_units}, found {unit!r:.40}")
         return cls(**{key: UNIT_SIZES[key][unit] for key, unit in given.items()})
 
-    def of_law(self, power: float) -> float:
+    def law_factor(self, power: float) -> float:
         """Factor of effort over speed (or acceleration), for speeds with `power` lengths."""
         return self.mass * self.length ** (2 - 2 * power)
 
@@ -69,7 +69,7 @@ def convert_units(robot: Robot, units: Units, gravity: bool) -> Robot:
         links=tuple(_convert_link(link, units) for link in robot.links),
         joints=tuple(_convert_joint(joint, units) for joint in robot.joints),
         mimics=tuple(_convert_mimic(mimic, lengths) for mimic in robot.mimics),
-        looks=tuple(_convert_visual(visual, units.length) for visual in robot.looks),
+        visuals=tuple(_convert_visual(visual, units.length) for visual in robot.visuals),
         gravity=_scale_vector(robot.gravity, units.length) if gravity else robot.gravity,
     )
 
@@ -116,12 +116,12 @@ def _convert_law_entry(key: str, given: Any, powers: tuple[int, ...], units: Uni
         length_factor = units.length**power
         factor = length_factor if key == "limits" else units.mass * units.length**2 / length_factor
         return {name: x * factor for name, x in given.items()}
-    return given * (units.length**power if key == "rest" else units.of_law(power))
+    return given * (units.length**power if key == "rest" else units.law_factor(power))
 
 
 def _convert_mimic(mimic: Mimic, lengths: Mapping[str, float]) -> Mimic:
     """Convert a mimic relation; `lengths` are the factors of joints whose value is a length."""
-    own_factor, other_factor = lengths.get(mimic.of, 1.0), lengths.get(mimic.other, 1.0)
+    own_factor, other_factor = lengths.get(mimic.follower, 1.0), lengths.get(mimic.leader, 1.0)
     return replace(
         mimic,
         multiplier=mimic.multiplier * own_factor / other_factor,

@@ -15,7 +15,7 @@ from ...numerics.pose import IDENTITY_POSE, Pose
 from ...numerics.rotations import Matrix, Vector, from_rpy, perpendicular_vector, product, transpose
 from ..validators.inertia import negative_moment_message, without_rounding
 from ..validators.validation_messages import did_you_mean
-from .robot_model import FIXED, NOTHING, ImportNote, Joint, Link, Mimic, Robot, Visual, color
+from .robot_model import FIXED, ZERO_MATRIX, ImportNote, Joint, Link, Mimic, Robot, Visual, color
 from .xml_reader import Element, parse_xml
 
 
@@ -53,8 +53,8 @@ class _SupportedContent(NamedTuple):
     """Supported attributes of an element, and supported children: once, or any number of times."""
 
     attributes: tuple[str, ...]
-    once: tuple[str, ...] = ()
-    often: tuple[str, ...] = ()
+    unique_tags: tuple[str, ...] = ()
+    repeatable_tags: tuple[str, ...] = ()
 
 
 #: Supported elements of a robot; elements with other tags are ignored with their content.
@@ -86,8 +86,8 @@ def read_urdf(content: bytes, where: str) -> Robot:
     if any(child.tag.startswith("xacro:") for child in root.children):
         raise SceneError(f"{where}: this is a xacro file; expand it with xacro FILE > robot.urdf")
     reader = _UrdfReader(root)
-    links = tuple(map(reader.link, root.all("link")))
-    joints = tuple(map(reader.joint, root.all("joint")))
+    links = tuple(map(reader.link, root.children_with_tag("link")))
+    joints = tuple(map(reader.joint, root.children_with_tag("joint")))
     ignored_counts = Counter(
         child.tag for child in root.children if child.tag not in _SUPPORTED_TAGS
     )
@@ -95,7 +95,7 @@ def read_urdf(content: bytes, where: str) -> Robot:
         reader.note(root, f"<{tag}>", f"left out, {count} of them" if count > 1 else "left out")
     name = root.attributes.get("name", "")
     return Robot(
-        name, where, links, joints, tuple(reader.mimics), tuple(reader.looks), tuple(reader.notes)
+        name, where, links, joints, tuple(reader.mimics), tuple(reader.visuals), tuple(reader.notes)
     )
 
 
@@ -103,11 +103,12 @@ class _UrdfReader:
     """Reader of links and joints that also collects notes, visuals and mimics."""
 
     def __init__(self, root: Element) -> None:
-        self.notes, self.looks, self.mimics = list[ImportNote](), list[Visual](), list[Mimic]()
+        self.notes, self.visuals, self.mimics = list[ImportNote](), list[Visual](), list[Mimic]()
         self._colors = {
             material.attributes.get("name", ""): colour
-            for material in root.all(_MATERIAL_TAG) if (colour := _material_colour(material))
-        }  # fmt: skip
+            for material in root.children_with_tag(_MATERIAL_TAG)
+            if (colour := _material_colour(material))
+        }
 
     def note(self, at: Element, element: str, text: str) -> None:
         """Add a note about an element."""
@@ -127,9 +128,9 @@ class _UrdfReader:
             )
             self.note(one, owner, note_text)
         for tag, count in Counter(child.tag for child in one.children).items():
-            if tag not in (*supported.once, *supported.often):
+            if tag not in (*supported.unique_tags, *supported.repeatable_tags):
                 self.note(one, owner, f"<{tag[:40]}> in <{one.tag}> left out")
-            elif count > 1 and tag in supported.once:
+            elif count > 1 and tag in supported.unique_tags:
                 note_text = (
                     f"<{tag}> is given {count} times; the first applies, the others are left out"
                 )
@@ -140,22 +141,22 @@ class _UrdfReader:
     def link(self, one: Element) -> Link:
         name = one.text("name")
         self._note_unread(one, f"link {name!r}")
-        self._looks_of(one, name)
-        inertial = one.first("inertial")
+        self._collect_visuals(one, name)
+        inertial = one.first_with_tag("inertial")
         if inertial is None:
             return Link(name, where=one.where)
-        frame, mass = _origin_pose(inertial), inertial.first("mass")
+        frame, mass = _origin_pose(inertial), inertial.first_with_tag("mass")
         mass_value = 0.0 if mass is None else mass.number("value", 0.0, "kg")
         if mass_value < 0:
             raise SceneError(
                 f"{inertial.where}: link {name!r}: expected a mass of 0 kg or more, found "
                 f"{mass_value:g}"
             )
-        given_inertia = _inertia_matrix(inertial.first("inertia"))
+        given_inertia = _inertia_matrix(inertial.first_with_tag("inertia"))
         inertia = without_rounding(given_inertia, mass_value)
-        if mass_value > 0 and inertial.first("inertia") is None:
+        if mass_value > 0 and inertial.first_with_tag("inertia") is None:
             self.note(one, f"link {name!r}", "a mass without <inertia>: a point mass")
-        elif mass_value == 0 and inertia != NOTHING:
+        elif mass_value == 0 and inertia != ZERO_MATRIX:
             self.note(one, f"link {name!r}", "moments of inertia without a mass")
         if inertia != given_inertia:
             self.note(one, f"link {name!r}", "moments of inertia below 0 by rounding set to 0")
@@ -174,7 +175,7 @@ class _UrdfReader:
             raise SceneError(f"{one.where}: joint {name!r}: unknown type {type_name!r}{hint}")
         ends = []
         for tag in ("parent", "child"):
-            end = one.first(tag)
+            end = one.first_with_tag(tag)
             if end is None:
                 raise SceneError(f"{one.where}: joint {name!r} has no <{tag} link=...>; add it")
             ends.append(end.text("link"))
@@ -186,7 +187,7 @@ class _UrdfReader:
             )
         if joint_type.unit:
             keys |= self._law(one, name, joint_type.unit, limited=type_name != _UNLIMITED_TYPE)
-        mimic = one.first("mimic")
+        mimic = one.first_with_tag("mimic")
         if mimic is not None and not joint_type.unit:
             self.note(one, f"joint {name!r}", f"its <mimic> is left out: a {type_name} joint")
         elif mimic is not None:
@@ -197,7 +198,7 @@ class _UrdfReader:
         return Joint(name, joint_type.hinge, ends[0], ends[1], _origin_pose(one), keys, one.where)
 
     def _axis(self, one: Element, name: str) -> Vector:
-        axis = one.first("axis")
+        axis = one.first_with_tag("axis")
         x, y, z = (1.0, 0.0, 0.0) if axis is None else axis.numbers("xyz", (1.0, 0.0, 0.0), "1")
         squared_length = x * x + y * y + z * z
         if squared_length == 0:
@@ -209,14 +210,14 @@ class _UrdfReader:
     def _law(self, one: Element, name: str, unit: str, limited: bool) -> dict[str, Any]:
         """Law keys of a joint from <dynamics> and <limit>; limits become stops only on request."""
         law: dict[str, Any] = {}
-        if (dynamics := one.first("dynamics")) is not None:
+        if (dynamics := one.first_with_tag("dynamics")) is not None:
             for key, key_unit in (("damping", "N m s/rad or N s/m"), ("friction", "N m or N")):
                 number = dynamics.number(key, 0.0, key_unit)
                 if number < 0:
                     self.note(one, f"joint {name!r}", f"{key} below 0 left out")
                 elif number > 0:
                     law[key] = number if key == "damping" else {"coulomb": number}
-        limit = one.first("limit")
+        limit = one.first_with_tag("limit")
         if limit is not None and limited:
             lower, upper = (limit.number(key, 0.0, unit) for key in ("lower", "upper"))
             if lower < upper:
@@ -224,10 +225,10 @@ class _UrdfReader:
             elif {"lower", "upper"} & set(limit.attributes):
                 note_text = f"limits from {lower:g} to {upper:g} leave no range and are left out"
                 self.note(one, f"joint {name!r}", note_text)
-        rated = {**law.get("limits", {}), **({} if limit is None else self._rated(limit, name))}
+        rated = {**law.get("limits", {}), **({} if limit is None else self._rating(limit, name))}
         return ({"law": law} if law else {}) | ({"rated": rated} if rated else {})
 
-    def _rated(self, limit: Element, name: str) -> dict[str, float]:
+    def _rating(self, limit: Element, name: str) -> dict[str, float]:
         """Largest effort and speed of a joint, kept as its rating."""
         given_limits, unread_texts = dict[str, float](), list[str]()
         for key, unit in (("effort", "N m or N"), ("velocity", "rad/s or m/s")):
@@ -251,50 +252,55 @@ class _UrdfReader:
             self.note(limit, f"joint {name!r}", "limits of effort or velocity below 0 left out")
         return ratings
 
-    def _looks_of(self, one: Element, link: str) -> None:
+    def _collect_visuals(self, one: Element, link: str) -> None:
         """Collect the visuals of a link, or its collision shapes where none can be drawn."""
-        is_drawn = [self._look(link, visual) for visual in one.all("visual")]
+        is_drawn = [
+            self._collect_visual(link, visual) for visual in one.children_with_tag("visual")
+        ]
         if all(is_drawn):
             return
         collision_drawn = (
             []
             if any(is_drawn)
-            else [self._look(link, collision) for collision in one.all("collision")]
+            else [
+                self._collect_visual(link, collision)
+                for collision in one.children_with_tag("collision")
+            ]
         )
         note_text = (
             "drawn by its collision shapes" if any(collision_drawn) else "not all of it is drawn"
         )
         self.note(one, f"link {link!r}", note_text)
 
-    def _look(self, link: str, visual: Element) -> bool:
+    def _collect_visual(self, link: str, visual: Element) -> bool:
         """Collect a visual; return whether it is drawn.
 
         Errors only add a note: visuals do not affect the motion.
         """
         try:
-            return self._shape(link, visual)
+            return self._collect_shape(link, visual)
         except SceneError as error:
             self.notes.append(ImportNote(visual.where, f"link {link!r}", f"not drawn: {error}"))
             return False
 
-    def _shape(self, link: str, visual: Element) -> bool:
-        geometry = visual.first("geometry")
+    def _collect_shape(self, link: str, visual: Element) -> bool:
+        geometry = visual.first_with_tag("geometry")
         if geometry is None or not geometry.children:
             return True
         keys = _shape_keys(geometry.children[0])
         if keys is None:
             return False
-        if (material := visual.first(_MATERIAL_TAG)) is not None:
+        if (material := visual.first_with_tag(_MATERIAL_TAG)) is not None:
             colour = _material_colour(material) or self._colors.get(
                 material.attributes.get("name", "")
             )
             keys |= {"color": colour} if colour else {}
-        self.looks.append(Visual(link, _origin_pose(visual), keys))
+        self.visuals.append(Visual(link, _origin_pose(visual), keys))
         return True
 
 
 def _origin_pose(one: Element) -> Pose:
-    origin = one.first("origin")
+    origin = one.first_with_tag("origin")
     if origin is None:
         return IDENTITY_POSE
     x, y, z = origin.numbers("xyz", (0.0, 0.0, 0.0), "m")
@@ -340,7 +346,7 @@ def _mesh_keys(file: str, scale: Vector | tuple[float, ...]) -> dict[str, Any] |
 
 
 def _material_colour(material: Element) -> str | None:
-    colour_element = material.first("color")
+    colour_element = material.first_with_tag("color")
     return (
         None
         if colour_element is None

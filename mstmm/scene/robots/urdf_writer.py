@@ -8,7 +8,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from ...numerics.pose import IDENTITY_POSE, Pose
 from ...numerics.rotations import to_rpy
-from .robot_model import NOTHING, Joint, Link, Mimic, Robot, Visual
+from .robot_model import ZERO_MATRIX, Joint, Link, Mimic, Robot, Visual
 from .urdf_reader import JOINT_TYPES_BY_HINGE, LIMITED_TYPES, NO_LIMIT
 
 
@@ -16,13 +16,13 @@ def as_urdf(robot: Robot) -> str:
     """Convert a robot to URDF text: links, then joints."""
     root = Element("robot", name=robot.name)
     visuals_by_link: dict[str, list[Visual]] = {}
-    for visual in robot.looks:
+    for visual in robot.visuals:
         visuals_by_link.setdefault(visual.link, []).append(visual)
     for link in robot.links:
         _fill_link(
             SubElement(root, "link", name=link.name), link, visuals_by_link.get(link.name, ())
         )
-    mimics = {mimic.of: mimic for mimic in robot.mimics}
+    mimics = {mimic.follower: mimic for mimic in robot.mimics}
     for joint in robot.joints:
         _add_joint(root, joint, mimics.get(joint.name))
     indent(root)
@@ -42,7 +42,7 @@ def _add_origin(parent: Element, pose: Pose) -> None:
 
 
 def _fill_link(one: Element, link: Link, looks: Iterable[Visual]) -> None:
-    if link.mass or link.inertia != NOTHING:
+    if link.mass or link.inertia != ZERO_MATRIX:
         inertial = SubElement(one, "inertial")
         _add_origin(inertial, Pose(link.center))
         SubElement(inertial, "mass", value=repr(float(link.mass)))
@@ -93,7 +93,7 @@ def _add_joint(root: Element, joint: Joint, mimic: Mimic | None) -> None:
         SubElement(element, "dynamics", {key: repr(float(x)) for key, x in dynamics.items() if x})
     if mimic is not None:
         numbers = {"multiplier": repr(mimic.multiplier), "offset": repr(mimic.offset)}
-        SubElement(element, "mimic", {"joint": mimic.other, **numbers})
+        SubElement(element, "mimic", {"joint": mimic.leader, **numbers})
 
 
 def _add_limit(one: Element, limits: Mapping[str, float], has_ends: bool) -> None:

@@ -22,13 +22,13 @@ class Element:
     where: str
     children: list[Element] = field(default_factory=list)
 
-    def all(self, tag: str) -> Iterator[Element]:
+    def children_with_tag(self, tag: str) -> Iterator[Element]:
         """Children with this tag, in the order of the file."""
         return (child for child in self.children if child.tag == tag)
 
-    def first(self, tag: str) -> Element | None:
+    def first_with_tag(self, tag: str) -> Element | None:
         """First child with this tag, or None."""
-        return next(self.all(tag), None)
+        return next(self.children_with_tag(tag), None)
 
     def text(self, key: str) -> str:
         """Value of a required attribute.  Raises SceneError."""

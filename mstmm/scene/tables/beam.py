@@ -20,7 +20,7 @@ class Beam(BeamKeys):
     """
 
     @model_validator(mode="after")
-    def _settle(self) -> Beam:
+    def _resolve_ends_and_basis(self) -> Beam:
         object.__setattr__(self, "ends", self._all_ends())
         if self.shapes is not None and self.basis == AUTO:
             object.__setattr__(self, "basis", GIVEN)

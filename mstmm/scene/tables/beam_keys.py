@@ -217,9 +217,9 @@ class BeamKeys(FlexibleTable, SectionTable):
         given_sections = self.section or (
             Section.model_construct(from_=0.0, to=self.length, **dict.fromkeys(_SECTION_KEYS)),
         )
-        return tuple(self._filled(given_section) for given_section in given_sections)
+        return tuple(self._complete_section(given_section) for given_section in given_sections)
 
-    def _filled(self, piece: Section) -> Section:
+    def _complete_section(self, piece: Section) -> Section:
         data = {
             key: getattr(self, key) if getattr(piece, key) is None else getattr(piece, key)
             for key in _SECTION_KEYS

@@ -92,12 +92,12 @@ class Chain(Table):
 
     @model_validator(mode="after")
     def _check(self) -> Chain:
-        problems = [*self._misplaced(), *self._too_many(), *self._ends()]
+        problems = [*self._position_problems(), *self._count_problems(), *self._ends()]
         if problems:
             raise ValidationProblems(*problems)
         return self
 
-    def _misplaced(self) -> Iterator[tuple[Location, str]]:
+    def _position_problems(self) -> Iterator[tuple[Location, str]]:
         inboard_body = split_reference(self.inboard)[0]
         if inboard_body != GROUND and self.position != (0.0, 0.0, 0.0):
             yield (
@@ -106,7 +106,7 @@ class Chain(Table):
                 f'define an end of "{inboard_body}" there',
             )
 
-    def _too_many(self) -> Iterator[tuple[Location, str]]:
+    def _count_problems(self) -> Iterator[tuple[Location, str]]:
         for key in ("body", "hinge"):
             tables = len(getattr(self, key))
             if tables > self.count:

@@ -144,7 +144,7 @@ class Coupling(Table):
         return row
 
     @property
-    def goes_by_time(self) -> bool:
+    def is_time_dependent(self) -> bool:
         """Whether it prescribes motion, as a drive does."""
         equals = self.equals
         return (

@@ -25,7 +25,7 @@ class HingeTable(HingeKeys):
     """
 
     @model_validator(mode="after")
-    def _settle(self) -> Self:
+    def _apply_defaults(self) -> Self:
         for key, value in resolve_defaults(self).items():
             object.__setattr__(self, key, value)
         return self
@@ -78,7 +78,7 @@ class Hinge(HingeTable):
         """Outboard end of the hinge, "" for the origin of the body."""
         return split_reference(self.outboard)[1]
 
-    def misplaced(self) -> list[tuple[Location, str]]:
+    def end_problems(self) -> list[tuple[Location, str]]:
         """Problems of the ends: ground as outboard, a single body, or a misplaced position."""
         problems: list[tuple[Location, str]] = []
         if self.outboard_body == GROUND:
@@ -99,11 +99,11 @@ class Hinge(HingeTable):
         return problems
 
     @property
-    def holds(self) -> bool:
+    def keeps_initial_values(self) -> bool:
         """Whether initial values of q are kept exactly."""
         return self.hold
 
     @property
-    def lets_go(self) -> bool:
+    def is_released(self) -> bool:
         """Whether the hinge has a release condition."""
         return self.release is not None

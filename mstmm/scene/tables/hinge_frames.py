@@ -64,7 +64,7 @@ def initial_motion_axes(hinge: HingeKeys) -> list[tuple[Vector, Vector]] | None:
         return None
     given_values = {**hinge.parameters, **parameters_from_keys(hinge)}
     numbers = [float(given_values.get(p.name, p.default or 0.0)) for p in facts.parameters]
-    motions, (_, outboard) = facts.at_start(numbers), hinge_frames(hinge)
+    motions, (_, outboard) = facts.start_motion_columns(numbers), hinge_frames(hinge)
     if not all(math.isfinite(x) for pair in motions for vector in pair for x in vector):
         return None
     return [(_rotate(outboard, t), _rotate(outboard, r)) for t, r in motions]

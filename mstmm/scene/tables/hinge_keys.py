@@ -102,16 +102,16 @@ class HingeKeys(Table):
         x, y, z = unit_vector(self.axis2)
         return (x, y, z)
 
-    def misplaced(self) -> list[tuple[Location, str]]:
+    def end_problems(self) -> list[tuple[Location, str]]:
         """Problems of the ends of the hinge; none for a table without ends."""
         return []
 
     @property
-    def lets_go(self) -> bool:
+    def is_released(self) -> bool:
         """Whether the hinge has a release condition."""
         return False
 
     @property
-    def holds(self) -> bool:
+    def keeps_initial_values(self) -> bool:
         """Whether initial values of q are kept exactly when loops are assembled."""
         return False

@@ -35,7 +35,7 @@ def resolve_defaults(hinge: HingeKeys) -> dict[str, Any]:
     Hinges of user-defined types are resolved by `resolve_defaults_for` when their definition is
     available.
     """
-    problems = hinge.misplaced()
+    problems = hinge.end_problems()
     changes: dict[str, Any] = {}
     if hinge.builtin is not None:
         if hinge.parameters:
@@ -68,16 +68,16 @@ def _resolve(
     changes["law"] = _resolve_law(hinge, kind, problems)
     drive = _check_drive(hinge, kind, problems)
     changes["drive"] = drive
-    if hinge.lets_go and drive is None and kind.coordinates:
+    if hinge.is_released and drive is None and kind.coordinates:
         problems.append((
             ("release",),
             "only a driven or fixed hinge can be released; add a drive, or leave it out",
         ))  # fmt: skip
-    if hinge.holds and not kind.coordinates:
+    if hinge.keeps_initial_values and not kind.coordinates:
         problems.append(
             (("hold",), f"{hinge_with_article(kind.name)} has no coordinates; leave it out")
         )
-    elif hinge.holds and drive is not None and None not in drive:
+    elif hinge.keeps_initial_values and drive is not None and None not in drive:
         problems.append((("hold",), "the drive gives the initial values; leave it out"))
     if not problems:
         changes["initial"] = _resolve_initial(hinge, kind, drive, problems)
@@ -132,7 +132,7 @@ def _resolve_axes(
 
 
 def _resolve_planar_axes(hinge: HingeKeys, problems: list[tuple[Location, str]]) -> dict[str, Any]:
-    """Resolve the normal under both its keys, and the direction of x in the plane."""
+    """Normal (keys `axis` and `normal`) and x direction of a planar hinge; defaults if absent."""
     normal = hinge.axis if hinge.normal is None else hinge.normal
     if hinge.normal is not None and hinge.axis not in (_Z_AXIS, hinge.normal):
         problems.append(

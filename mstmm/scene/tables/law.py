@@ -31,7 +31,7 @@ class Friction(Table):
         return self.static > 0
 
     @model_validator(mode="after")
-    def _settle(self) -> Friction:
+    def _resolve_static_friction(self) -> Friction:
         if self.static == 0:
             object.__setattr__(self, "static", self.coulomb)
         if self.static < self.coulomb:
@@ -61,7 +61,7 @@ class Limits(Table):
         return self.lower is not None or self.upper is not None
 
     @property
-    def yields(self) -> bool:
+    def is_compliant(self) -> bool:
         """Whether there is a stop with a spring and a damper."""
         return self.acts and self.restitution is None
 
@@ -76,8 +76,8 @@ class Limits(Table):
         return self if self.restitution is None else self._hard(self.restitution)
 
     @model_validator(mode="after")
-    def _pushes(self) -> Limits:
-        if self.yields and self.stiffness == 0:
+    def _check_stop_stiffness(self) -> Limits:
+        if self.is_compliant and self.stiffness == 0:
             raise rules.problem(
                 "a stop needs a stiffness above 0 (N/m or N m/rad) or a restitution; "
                 "write for example stiffness = 1e5", "stiffness",
@@ -92,8 +92,7 @@ class Limits(Table):
             )
         if self.stiffness > 0 or self.damping > 0:
             raise rules.problem(
-                "expected restitution or stiffness for a stop, found both; give one",
-                "restitution",
+                "expected restitution or stiffness for a stop, found both; give one", "restitution"
             )
         return self
 
@@ -179,7 +178,4 @@ class SpringLaw(Table):
     stiffness: Annotated[float, rules.number_rule("N/m", minimum=0)] = 0.0
     rest: Annotated[float, rules.number_rule("m", minimum=0)] = 0.0
     damping: Annotated[float, rules.number_rule("N s/m", minimum=0)] = 0.0
-    effort: Annotated[
-        Expression,
-        texts.expression_rule("a number or expression in N"),
-    ] = number(0)
+    effort: Annotated[Expression, texts.expression_rule("a number or expression in N")] = number(0)

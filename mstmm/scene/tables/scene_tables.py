@@ -88,7 +88,7 @@ class SceneTables(Table):
         """All events: `event`, then the hard stops of hinges."""
         return (*self.event, *stop_events(self.hinges))
 
-    def happening(self, number: int) -> str:
+    def event_label(self, number: int) -> str:
         """Name in messages of the event at index `number` of `events`."""
         event_kind = "event" if number < len(self.event) else "stop"
         return f'{event_kind} "{self.events[number].name}"'
@@ -99,7 +99,7 @@ class SceneTables(Table):
         return (*self.spring, *self.bushing)
 
     @property
-    def controlled(self) -> dict[str, str]:
+    def controllers_by_input(self) -> dict[str, str]:
         """Names of controllers by the inputs that they set."""
         return {
             name: controller_table.name

@@ -81,7 +81,7 @@ def end_rule(ground: bool = True) -> Rule:
 
 
 def body_rule(expected: str) -> Rule:
-    """Rule for a reference to a body ("rod1", or "rope[3]" of a chain), or a keyword."""
+    """Rule for the spelling of a body's name: "rod1", or "rope[3]" of a chain; not "ground"."""
 
     def check(value: Any) -> str:
         checked_text = require_text(value, expected)

@@ -35,12 +35,12 @@ class ExpandedScene:
     Attributes:
         scene: the new scene.
         names: body, end or hinge of a chain -> its name in the new scene.
-        words: a sentence for each chain.
+        descriptions: a sentence for each chain.
     """
 
     scene: Scene
     names: Mapping[str, str] = field(default_factory=dict)
-    words: tuple[str, ...] = ()
+    descriptions: tuple[str, ...] = ()
 
 
 def expandable_chains(scene: Scene) -> tuple[Chain, ...]:

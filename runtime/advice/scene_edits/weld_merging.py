@@ -42,24 +42,24 @@ class MergedScene:
         scene: the new scene.
         names: body or end of the former scene, "arm" or "arm.tip" -> "hub.arm", "hub.arm_tip", or
             "ground".
-        into: removed body -> body that it is part of, or "ground".
-        still: body or end of the former scene -> its fixed position, m.
+        carriers: removed body -> body that it is part of, or "ground".
+        fixed_points: body or end of the former scene -> its fixed position, m.
         idle: removed loads and springs, which have no effect any more.
         written: a sentence for each expanded chain.
     """
 
     scene: Scene
     names: Mapping[str, str] = field(default_factory=dict)
-    into: Mapping[str, str] = field(default_factory=dict)
-    still: Mapping[str, Vector] = field(default_factory=dict)
+    carriers: Mapping[str, str] = field(default_factory=dict)
+    fixed_points: Mapping[str, Vector] = field(default_factory=dict)
     idle: tuple[str, ...] = ()
     written: tuple[str, ...] = ()
 
     @property
-    def words(self) -> tuple[str, ...]:
+    def descriptions(self) -> tuple[str, ...]:
         """Sentences on expanded chains, merged bodies, and removed loads and springs."""
         parts_by_whole: dict[str, list[str]] = {}
-        for part, whole in self.into.items():
+        for part, whole in self.carriers.items():
             parts_by_whole.setdefault(whole, []).append(part)
         merged = [
             f"{_body_text(whole)}: merged with {', '.join(parts)}, which are welded to it; "
@@ -72,9 +72,9 @@ class MergedScene:
         return (*self.written, *merged, *removed)
 
     def _moved_text(self, name: str) -> str:
-        if name not in self.still:
+        if name not in self.fixed_points:
             return f"{name} is {self.names[name]} now"
-        return f"{name} is at [{', '.join(f'{x:.6g}' for x in self.still[name])}] now"
+        return f"{name} is at [{', '.join(f'{x:.6g}' for x in self.fixed_points[name])}] now"
 
 
 def _body_text(name: str) -> str:
@@ -99,16 +99,20 @@ def merge_welds(scene: Scene, keep: Collection[str] = ()) -> MergedScene | None:
             if removed is not None:
                 break
         else:
-            return _with_chain_names(merged, expanded) if merged.into else None
+            return _with_chain_names(merged, expanded) if merged.carriers else None
         merged = _remove_weld(merged, weld, removed, bodies)
 
 
 def _with_chain_names(merged: MergedScene, expanded: ExpandedScene) -> MergedScene:
     """The merged scene with names that refer to the scene before its chains were expanded."""
-    still = {old: merged.still[new] for old, new in expanded.names.items() if new in merged.still}
+    still = {
+        old: merged.fixed_points[new]
+        for old, new in expanded.names.items()
+        if new in merged.fixed_points
+    }
     return replace(
         merged, names=compose_names(expanded.names, merged.names),
-        still={**merged.still, **still}, written=expanded.words,
+        fixed_points={**merged.fixed_points, **still}, written=expanded.descriptions,
     )  # fmt: skip
 
 
@@ -148,7 +152,7 @@ def _removable_body(
     weld: Hinge, bodies: Mapping[str, Body], scene: Scene, referenced: ReferencedParts
 ) -> str | None:
     """Body of a weld that can become part of the other one; None if neither can."""
-    if not weld.is_weld or weld.lets_go or weld.name in referenced.hinges:
+    if not weld.is_weld or weld.is_released or weld.name in referenced.hinges:
         return None
     pair = (weld.outboard_body, weld.inboard_body)
     if any(name != GROUND and not _is_rigid(bodies.get(name)) for name in pair):
@@ -161,7 +165,7 @@ def _removable_body(
         return None
     if weld.inboard_body == GROUND:
         is_last = len(scene.skeleton.bodies) == 1
-        return None if is_last or weld.outboard_body in referenced.places else weld.outboard_body
+        return None if is_last or weld.outboard_body in referenced.frames else weld.outboard_body
     return next((name for name in pair if name not in referenced.bodies), None)
 
 
@@ -208,7 +212,7 @@ def _remove_weld(
     if removed != weld.outboard_body:
         pose = pose.inverse
     poses = {removed: pose} | {
-        f"{removed}.{end}": pose.then(end_pose(part, end)) for end in part.ends
+        f"{removed}.{end}": pose.compose(end_pose(part, end)) for end in part.ends
     }
     scene = with_tables(
         merged.scene, hinge=tuple(hinge for hinge in merged.scene.hinge if hinge.name != weld.name)
@@ -247,13 +251,13 @@ def _record_removal(
     merged: MergedScene, scene: Scene, part: str, whole: str, names: Mapping[str, str]
 ) -> MergedScene:
     """The merged scene after one more body has been removed."""
-    into = {body: whole if target == part else target for body, target in merged.into.items()}
+    into = {body: whole if target == part else target for body, target in merged.carriers.items()}
     former = {old: names.get(new, new) for old, new in merged.names.items()}
     idle = [spring for spring in scene.spring if _is_on_one_body(spring)]
     return replace(
         merged,
         scene=with_tables(scene, spring=tuple(s for s in scene.spring if s not in idle)),
-        names={**former, **names}, into={**into, part: whole},
+        names={**former, **names}, carriers={**into, part: whole},
         idle=(*merged.idle, *(f'spring "{spring.name}"' for spring in idle)),
     )  # fmt: skip
 
@@ -287,7 +291,9 @@ def _merge_into_ground(
     names = dict.fromkeys(poses, GROUND)
     after = _record_removal(merged, changed, removed, GROUND, names)
     idle_loads = tuple(f'load "{load.name}"' for load in idle)
-    return replace(after, still={**merged.still, **still}, idle=(*idle_loads, *after.idle))
+    return replace(
+        after, fixed_points={**merged.fixed_points, **still}, idle=(*idle_loads, *after.idle)
+    )
 
 
 def _acts_on(load: Load, body: str) -> bool:
@@ -308,7 +314,7 @@ def _attached_to_ground(element: Any, rotation: Matrix, poses: Mapping[str, Pose
     return element.model_copy(
         update={
             "inboard": GROUND, "position": pose.position,
-            "orientation": to_orientation(pose.then(Pose(ZERO, rotation))),
+            "orientation": to_orientation(pose.compose(Pose(ZERO, rotation))),
         }
     )  # fmt: skip
 

@@ -37,19 +37,19 @@ def count_refinements(engine: LoopedEngine, q: Array, u: Array, mobility: int) -
     memory = engine.start_memory()
     states = np.tile(q, (2, 1)), np.tile(u, (2, 1)), np.tile(memory, (2, 1))
 
-    def answers(count: int) -> Array:
+    def accelerations(count: int) -> Array:
         model.refines = count
         return engine.accelerations(0.0, *states, efforts)[1]
 
-    weight = float(np.linalg.norm(engine.packed.described.gravity))
+    weight = float(np.linalg.norm(engine.packed.user_scene.gravity))
     characteristic_acceleration = weight + float(np.abs(u).max(initial=0.0)) ** 2
     characteristic_acceleration = (
         characteristic_acceleration if mobility > 0 else max(characteristic_acceleration, 1.0)
     )  # driven mechanisms may be at rest
     try:
-        previous = answers(0)
+        previous = accelerations(0)
         for count in range(1, _MAX_REFINEMENTS + 1):
-            refined = answers(count)
+            refined = accelerations(count)
             sizes = np.abs(refined).max(axis=1)
             minimum = _BALANCED_FRACTION * max(
                 characteristic_acceleration, float(sizes.max()), np.finfo(float).tiny
@@ -65,8 +65,8 @@ def count_refinements(engine: LoopedEngine, q: Array, u: Array, mobility: int) -
     largest_error = float(relative_change.max())
     if largest_error > _MAX_ERROR:
         raise NumericalFailure(
-            f"accelerations{' of the closed loops' * engine.packed.system.closes} have a relative "
-            f"error of {largest_error:.1g} that refinement does not reduce: "
+            f"accelerations{' of the closed loops' * engine.packed.system.has_loops} have a "
+            f"relative error of {largest_error:.1g} that refinement does not reduce: "
             f"{mass_ratio_text(engine)}"
         )
     return _MAX_REFINEMENTS
@@ -90,11 +90,11 @@ def mass_ratio_text(engine: LoopedEngine) -> str:
 
     If their masses are similar, another cause in closed loops is named.
     """
-    masses = {body.name: body.mass for body in engine.packed.described.body if body.mass > 0}
+    masses = {body.name: body.mass for body in engine.packed.user_scene.body if body.mass > 0}
     if not masses:
         return "make the masses of bodies more similar"
     heaviest, lightest = (extreme(masses, key=masses.__getitem__) for extreme in (max, min))
-    if masses[heaviest] < _MIN_MASS_RATIO * masses[lightest] and engine.packed.system.closes:
+    if masses[heaviest] < _MIN_MASS_RATIO * masses[lightest] and engine.packed.system.has_loops:
         return find_skewed_axis(engine.packed, MIN_COUNTING_ANGLE) or (
             "their constraints are nearly redundant; make axes parallel and points coincide, or "
             "use a ball or cylindrical hinge"

@@ -17,7 +17,7 @@ from mstmm.array_validation import Array
 from mstmm.errors import LoopClosureError, NumericalFailure, SceneError
 
 from ...packing.loops.system_variants import (
-    LOCKED,
+    LOCKING_GAP_FRACTION,
     characteristic_length,
     with_speeds_prescribed,
     with_stiff_modes,
@@ -51,7 +51,7 @@ _MAX_VELOCITY_ERROR, _MIN_INDEPENDENT_PIVOT = 1e-8, 1e-15
 _CUT_ONLY_COMPLIANCE = 1e14
 
 
-def engine_with_held(engine: LoopedEngine, hinges: Collection[str]) -> LoopedEngine:
+def engine_with_fixed(engine: LoopedEngine, hinges: Collection[str]) -> LoopedEngine:
     """Engine of the same scene with all speeds of some hinges prescribed.
 
     Flexible bodies retain their stiffness at rest.
@@ -65,7 +65,7 @@ def engine_with_held(engine: LoopedEngine, hinges: Collection[str]) -> LoopedEng
     )
     loop_records, own_records = packed.written.loops, held_engine.packed.written.loops
     assert loop_records is not None and own_records is not None
-    own_records.judge_as(loop_records)
+    own_records.copy_pivot_floors(loop_records)
     return held_engine
 
 
@@ -79,13 +79,13 @@ class Assembly:
         self, engine: LoopedEngine, q: Array, hinges: Collection[str] = (),
         behind: Callable[[Array], str] = lambda q: "", t: float = 0.0,
     ) -> None:  # fmt: skip
-        self.held, self._behind = tuple(hinges), behind
-        self.calls = LoopCalls(engine_with_held(engine, hinges), q, t=t)
+        self.fixed_hinges, self._find_cause = tuple(hinges), behind
+        self.calls = LoopCalls(engine_with_fixed(engine, hinges), q, t=t)
         if self.calls.engine is not engine:
-            self.calls.judge_by([q])
-        self._weights = self._weighted()
+            self.calls.set_pivot_reference([q])
+        self._weights = self._compute_weights()
         #: 1 for speeds that are neither fixed nor driven, else 0.
-        self.free = self._free_speeds()
+        self.free_speed_mask = self._free_speeds()
 
     def positions(self, q: Array, much: float = 0.0, rough: bool = True) -> Array:
         """Close the loops near q (nq,).
@@ -102,18 +102,20 @@ class Assembly:
                 return nearest
             # Perturb the start: with all links in line the direction of bending is undetermined.
             change = (
-                random_generator.uniform(-_START_DISTANCE, _START_DISTANCE, len(self._still))
-                * self.free
+                random_generator.uniform(-_START_DISTANCE, _START_DISTANCE, len(self._zero_speeds))
+                * self.free_speed_mask
             )
-            trial, trial_gaps = self._nearest(self.calls.moved(start, change), rough)
+            trial, trial_gaps = self._nearest(self.calls.move(start, change), rough)
             if self._largest(trial_gaps) < self._largest(gaps):
                 nearest, gaps = trial, trial_gaps
         if self._closes(gaps, much):
             return nearest
         gap = self._largest(gaps)
-        raise LoopClosureError(self._open(nearest, gaps), gap, self.by_names(nearest))
+        raise LoopClosureError(
+            self._open_loop_message(nearest, gaps), gap, self.coordinates_by_name(nearest)
+        )
 
-    def nearest_closed(self, q: Array, much: float = 0.0) -> Array | None:
+    def closed_state_near(self, q: Array, much: float = 0.0) -> Array | None:
         """State (nq,) reached from q if its gaps are at most `much`, else None."""
         try:
             nearest_q, gaps = self._nearest(q, much > 0.0)
@@ -128,22 +130,22 @@ class Assembly:
         """
         self.calls.choose(q)
         for _ in range(_MAX_CHOICES):
-            q, gaps = self._stepped(q, rough)
+            q, gaps = self._iterate(q, rough)
             if not self.calls.choose(q):
                 break
         return q, gaps
 
-    def _stepped(self, q: Array, rough: bool) -> tuple[Array, Array]:
+    def _iterate(self, q: Array, rough: bool) -> tuple[Array, Array]:
         """Result of `_nearest` for the current choice of rows."""
-        q, compliance, remaining_path = self._own(q), _INITIAL_COMPLIANCE, np.inf
-        error = self._rest(q)
+        q, compliance, remaining_path = self._adapt_closing_hinges(q), _INITIAL_COMPLIANCE, np.inf
+        error = self._squared_gap(q)
         for _ in range(_MAX_STEPS):
             change, gaps = self._correction(q, compliance)
             if self._closes(gaps):
-                q = self.calls.moved(q, change)
+                q = self.calls.move(q, change)
                 break
             length = float(np.abs(change).max(initial=0.0))
-            if rough and self._largest(gaps) < self._locks:
+            if rough and self._largest(gaps) < self._locking_gap:
                 remaining_path = (
                     _LONG_PATH_RATIO * self._largest(gaps)
                     if remaining_path == np.inf
@@ -152,8 +154,10 @@ class Assembly:
                 remaining_path -= length
                 if remaining_path < 0.0:
                     break
-            trial = self._own(self.calls.moved(q, change * min(1.0, _MAX_STEP / (length or 1.0))))
-            trial_error = self._rest(trial)
+            trial = self._adapt_closing_hinges(
+                self.calls.move(q, change * min(1.0, _MAX_STEP / (length or 1.0)))
+            )
+            trial_error = self._squared_gap(trial)
             if trial_error < error:
                 reduction = 3.0 if length < _MAX_STEP else 1.0
                 compliance = max(
@@ -164,13 +168,17 @@ class Assembly:
                 break
             else:
                 compliance *= 10.0
-        return q, self._lacking(q, self._still, self.calls.gap, _MAX_COMPLIANCE)[1]
+        return q, self._correction_and_errors(
+            q, self._zero_speeds, self.calls.position_level, _MAX_COMPLIANCE
+        )[1]
 
-    def _lacking(self, q: Array, u: Array, level: int, give: float = 0.0) -> tuple[Array, Array]:
+    def _correction_and_errors(
+        self, q: Array, u: Array, level: int, give: float = 0.0
+    ) -> tuple[Array, Array]:
         """Correction and row errors; misfits of rows not chosen at present count as zero."""
         change, errors = self.calls.correction(level, q, u, give)
-        max_misfit = self._locks * max(1.0, float(np.abs(u).max(initial=0.0)))
-        is_misfit = self.calls.resting() & (np.abs(errors) <= max_misfit)
+        max_misfit = self._locking_gap * max(1.0, float(np.abs(u).max(initial=0.0)))
+        is_misfit = self.calls.inactive_rows() & (np.abs(errors) <= max_misfit)
         return change, np.where(is_misfit, 0.0, errors)
 
     def speeds(self, q: Array, u: Array) -> Array:
@@ -179,40 +187,40 @@ class Assembly:
         Raises SceneError if the fixed speeds do not permit it.
         """
         self.calls.choose(q)
-        u, errors = self._without_slips(q, u)
+        u, errors = self._remove_velocity_errors(q, u)
         is_counting = self.calls.inverses() > 0
-        if self._slipping(u, errors) is not None and not is_counting.all():
+        if self._largest_error_row(u, errors) is not None and not is_counting.all():
             # Near a singular pose, small pivots above rounding belong to independent rows.
             floors = [self.calls.records.floor(row) for row in range(self.calls.count)]
             for k, mobility in enumerate(self.calls.mobility.tolist()):
-                self.calls.records.judge(k, _MIN_INDEPENDENT_PIVOT * mobility)
-            u, errors = self._without_slips(q, u)
+                self.calls.records.set_pivot_floor(k, _MIN_INDEPENDENT_PIVOT * mobility)
+            u, errors = self._remove_velocity_errors(q, u)
             for k, floor in enumerate(floors):
-                self.calls.records.judge(k, floor)
-        row = self._slipping(u, errors)
+                self.calls.records.set_pivot_floor(k, floor)
+        row = self._largest_error_row(u, errors)
         if row is not None:
-            cause = self._behind(q) or find_skewed_axis(
+            cause = self._find_cause(q) or find_skewed_axis(
                 self.calls.engine.packed, MIN_COUNTING_ANGLE
             )
             raise SceneError(
-                f"scene: the speeds given for {self._names()} contradict each other by "
-                f"{self._amount(row, errors, '.3g', '/s')} {self._where(row)}; "
+                f"scene: the speeds given for {self._names()} are inconsistent by "
+                f"{self._amount(row, errors, '.3g', '/s')} {self._location_text(row)}; "
                 f"{cause or 'give fewer or other speeds'}"
             )
         return u
 
-    def _without_slips(self, q: Array, u: Array) -> tuple[Array, Array]:
+    def _remove_velocity_errors(self, q: Array, u: Array) -> tuple[Array, Array]:
         """Speeds u with corrected velocity errors, and the remaining row errors."""
-        change, errors = self._lacking(q, u, self.calls.slip)
+        change, errors = self._correction_and_errors(q, u, self.calls.velocity_level)
         largest = self._largest(errors)
         while True:  # once, unless heavy outboard bodies cause a loss of digits
-            trial = u + self.free * change
-            change, trial_errors = self._lacking(q, trial, self.calls.slip)
+            trial = u + self.free_speed_mask * change
+            change, trial_errors = self._correction_and_errors(q, trial, self.calls.velocity_level)
             if not self._largest(trial_errors) < largest:
                 return u, errors
             u, errors, largest = trial, trial_errors, self._largest(trial_errors)
 
-    def _slipping(self, u: Array, missing: Array) -> int | None:
+    def _largest_error_row(self, u: Array, missing: Array) -> int | None:
         """Row with the largest velocity error if it exceeds rounding, else None."""
         max_slip = _MAX_VELOCITY_ERROR * max(1.0, float(np.abs(u).max(initial=0.0)))
         slips = np.abs(missing) / self._sizes
@@ -220,19 +228,23 @@ class Assembly:
 
     def _free_speeds(self) -> Array:
         engine, packed = self.calls.engine, self.calls.engine.packed
-        driven_speeds = {(engine.hinge_name(place), k) for place, k in packed.system.driven}
+        driven_speeds = {
+            (engine.hinge_name(tree_index), k) for tree_index, k in packed.system.driven
+        }
         is_free_speed = np.ones(engine.nu)
-        for hinge in packed.described.hinge:
+        for hinge in packed.user_scene.hinge:
             slots = packed.layout.hinges[hinge.name]
             for k in range(slots.nu):
                 is_fixed = (
-                    hinge.name in self.held or hinge.is_weld or (hinge.name, k) in driven_speeds
+                    hinge.name in self.fixed_hinges
+                    or hinge.is_weld
+                    or (hinge.name, k) in driven_speeds
                 )
                 is_free_speed[slots.u + k] = float(not is_fixed)
         return is_free_speed
 
     @property
-    def _still(self) -> Array:
+    def _zero_speeds(self) -> Array:
         return np.zeros(self.calls.engine.nu)
 
     def _correction(self, q: Array, give: float) -> tuple[Array, Array]:
@@ -240,21 +252,25 @@ class Assembly:
 
         Fixed coordinates do not change, although their rows comply.
         """
-        change, gaps = self._lacking(q, self._still, self.calls.gap, give)
-        return self.free * change, gaps
+        change, gaps = self._correction_and_errors(
+            q, self._zero_speeds, self.calls.position_level, give
+        )
+        return self.free_speed_mask * change, gaps
 
-    def _own(self, q: Array) -> Array:
+    def _adapt_closing_hinges(self, q: Array) -> Array:
         """Adapt the coordinates of closing hinges in q to the body positions."""
         for _ in range(12):
             change, _ = self._correction(q, _CUT_ONLY_COMPLIANCE)
             length = float(np.abs(change).max(initial=0.0))
             if not length > _NEGLIGIBLE_CHANGE:
                 break
-            q = self.calls.moved(q, change * min(1.0, _MAX_STEP / length))
+            q = self.calls.move(q, change * min(1.0, _MAX_STEP / length))
         return q
 
-    def _rest(self, q: Array) -> float:
-        gaps = self._lacking(q, self._still, self.calls.gap, _CUT_ONLY_COMPLIANCE)[1]
+    def _squared_gap(self, q: Array) -> float:
+        gaps = self._correction_and_errors(
+            q, self._zero_speeds, self.calls.position_level, _CUT_ONLY_COMPLIANCE
+        )[1]
         with np.errstate(over="ignore"):  # squares of requested values may overflow
             return float(np.sum(self._weights * gaps**2))
 
@@ -265,7 +281,7 @@ class Assembly:
     def _largest(self, missing: Array) -> float:
         return float(np.abs(missing).max(initial=0.0))
 
-    def _weighted(self) -> Array:
+    def _compute_weights(self) -> Array:
         """Weights (rows,) of the gaps: inverse mean mobility of lengths, angles or couplings.
 
         With equal weights within a kind the smallest gap depends only on the geometry.
@@ -273,16 +289,16 @@ class Assembly:
         calls = self.calls
         is_angle = np.zeros(calls.count, bool)
         for closure in calls.records.closures:
-            directions = calls.numbers_of(closure, "W")
+            directions = calls.closure_matrix(closure, "W")
             for direction, row in closure.rows.items() if closure.kind == "hinge" else ():
                 force, moment = directions[direction, :3], directions[direction, 3:]
                 is_angle[row] = moment @ moment > force @ force
         is_coupling = np.zeros(calls.count, bool)
         is_coupling[[closure.row for closure in calls.records.couplings]] = True
-        weights, self._turning = np.ones(calls.count), is_angle
+        weights, self._is_angle = np.ones(calls.count), is_angle
         length = max(1.0, characteristic_length(calls.engine.packed.system))
         self._sizes = np.where(is_angle | is_coupling, 1.0, length)
-        self._locks = LOCKED * characteristic_length(calls.engine.packed.system)
+        self._locking_gap = LOCKING_GAP_FRACTION * characteristic_length(calls.engine.packed.system)
         for kind in (is_angle, is_coupling, ~(is_angle | is_coupling)):
             if kind.any():
                 weights[kind] = 1.0 / calls.mobility[kind].mean()
@@ -292,15 +308,15 @@ class Assembly:
 
     # --- messages ---------------------------------------------------------------------------------
 
-    def _open(self, q: Array, missing: Array) -> str:
+    def _open_loop_message(self, q: Array, missing: Array) -> str:
         row = int(np.abs(missing).argmax())
-        held_text = f" with {self._names()} held" if self.held or self._driven() else ""
+        held_text = f" with {self._names()} fixed" if self.fixed_hinges or self._driven() else ""
         return (
-            f"scene: {self._subject(row)}: the nearest pose leaves "
+            f"scene: {self._subject(row)}: the nearest pose has a gap of "
             f"{self._amount(row, missing, '.7g')}{held_text}; {self._remedy(row, q, missing)}"
         )
 
-    def by_names(self, q: Array) -> dict[str, tuple[float, ...]]:
+    def coordinates_by_name(self, q: Array) -> dict[str, tuple[float, ...]]:
         """Coordinates q by hinge and flexible body name."""
         layout = self.calls.engine.packed.layout
         slots = {**layout.hinges, **layout.modal}
@@ -308,27 +324,29 @@ class Assembly:
 
     def _names(self) -> str:
         """Names of the fixed or driven hinges for messages."""
-        names = [f'"{name}"' for name in (*self.held, *self._driven())]
+        names = [f'"{name}"' for name in (*self.fixed_hinges, *self._driven())]
         return ", ".join(names[:_MAX_NAMES]) + (" ..." if names[_MAX_NAMES:] else "")
 
     def _driven(self) -> list[str]:
         packed = self.calls.engine.packed
-        hinges = packed.described.hinge if packed.system.driven else ()
-        return [hinge.name for hinge in hinges if hinge.drive and hinge.name not in self.held]
+        hinges = packed.user_scene.hinge if packed.system.driven else ()
+        return [
+            hinge.name for hinge in hinges if hinge.drive and hinge.name not in self.fixed_hinges
+        ]
 
-    def _where(self, row: int) -> str:
-        owner = self.calls.closing(row)
-        return f"in {owner}" if self.calls.coupling_of(row) else f"where {owner} closes a loop"
+    def _location_text(self, row: int) -> str:
+        owner = self.calls.closing_label(row)
+        return f"in {owner}" if self.calls.coupling_name(row) else f"where {owner} closes a loop"
 
     def _subject(self, row: int) -> str:
-        owner = self.calls.closing(row)
-        if self.calls.coupling_of(row):
+        owner = self.calls.closing_label(row)
+        if self.calls.coupling_name(row):
             return f"{owner} cannot be satisfied"
-        return f"the loop that {owner} closes stays open"
+        return f"the loop at {owner} cannot be closed"
 
     def _far_mass(self) -> str:
         """Message part that names a body with an implausibly distant mass centre, or ""."""
-        bodies = self.calls.engine.packed.described.body
+        bodies = self.calls.engine.packed.user_scene.body
         size = max(
             (math.hypot(*end.position) for b in bodies for end in b.ends.values()), default=0
         )
@@ -342,20 +360,20 @@ class Assembly:
         return ""
 
     def _remedy(self, row: int, q: Array, missing: Array) -> str:
-        if self.calls.coupling_of(row):
+        if self.calls.coupling_name(row):
             return "omit it or another coupling, or correct their expressions"
         cause = (
-            self._behind(q)
+            self._find_cause(q)
             or self._far_mass()
             or find_skewed_axis_by_gap(self.calls.engine.packed, self._largest(missing))
         )
         if cause:
             return cause
-        hold_text = ", hold or drive less" if self.held or self._driven() else ""
-        return f"correct lengths or axes{hold_text}, or start nearer to a closed state"
+        hold_text = ", fix or drive fewer hinges" if self.fixed_hinges or self._driven() else ""
+        return f"correct lengths or axes{hold_text}, or start closer to a closed configuration"
 
     def _amount(self, row: int, missing: Array, digits: str, per: str = "") -> str:
         amount = f"{abs(missing[row]):{digits}}"
-        if self.calls.coupling_of(row):
+        if self.calls.coupling_name(row):
             return amount
-        return f"{amount} {'rad' if self._turning[row] else 'm'}{per}"
+        return f"{amount} {'rad' if self._is_angle[row] else 'm'}{per}"

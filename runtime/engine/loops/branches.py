@@ -66,30 +66,30 @@ class RequestedCoordinates:
         self, packed: PackedScene, q: Array, kept: Collection[str], stated: bool = True
     ) -> None:
         self.packed, self.q, self._length = packed, q, characteristic_length(packed.system)
-        self.kept = tuple(kept)
+        self.kept_hinges = tuple(kept)
         counting_hinges = (
-            _hinges_with_initial_state(packed.described) if stated else packed.described.hinge
+            _hinges_with_initial_state(packed.user_scene) if stated else packed.user_scene.hinge
         )
         #: Indices in q of requested angles, lengths and quaternions.
-        self.angles, self.lengths, self._fours = list[int](), list[int](), list[int]()
+        self.angles, self.lengths, self._quaternions = list[int](), list[int](), list[int]()
         #: Indices in q of all angles, requested or not.
-        self.turning = list[int]()
-        driven_hinges = {hinge.name for hinge in packed.described.hinge if hinge.drive is not None}
+        self.angle_indices = list[int]()
+        driven_hinges = {hinge.name for hinge in packed.user_scene.hinge if hinge.drive is not None}
         names = {counted_hinge.name for counted_hinge in counting_hinges} - {*kept} - driven_hinges
-        for hinge in packed.described.hinge:
+        for hinge in packed.user_scene.hinge:
             self._sort(hinge, hinge.name in names)
 
     def _sort(self, hinge: Hinge, counts: bool) -> None:
         slots, facts = self.packed.layout.hinges[hinge.name], hinge.facts
         if slots.quaternion is not None:
-            self._fours += [slots.q + slots.quaternion] * counts
-        elif facts is not None and slots.straight:
+            self._quaternions += [slots.q + slots.quaternion] * counts
+        elif facts is not None and slots.rates_are_speeds:
             for k in range(slots.nq):
                 is_sliding = k in facts.slides
-                self.turning += [slots.q + k] * (not is_sliding)
+                self.angle_indices += [slots.q + k] * (not is_sliding)
                 (self.lengths if is_sliding else self.angles).extend([slots.q + k] * counts)
 
-    def off(self, q: Array) -> Array:
+    def deviation_of(self, q: Array) -> Array:
         """Deviation (nq,) of q from the requested coordinates; angles wrapped to half a turn."""
         deviation = np.zeros(len(q))
         deviation[self.lengths] = (q - self.q)[self.lengths]
@@ -98,33 +98,37 @@ class RequestedCoordinates:
 
     def distance(self, q: Array) -> float:
         """Distance of q from the requested coordinates; see `Branch`."""
-        deviation = self.off(q)
+        deviation = self.deviation_of(q)
         squares = float(np.sum(deviation[self.angles] ** 2))
         squares += float(np.sum((deviation[self.lengths] / self._length) ** 2))
-        for first in self._fours:
+        for first in self._quaternions:
             cosine = abs(float(q[first : first + 4] @ self.q[first : first + 4]))
             squares += (2.0 * math.acos(min(1.0, cosine))) ** 2
         return math.sqrt(squares)
 
-    def nearest_turn(self, q: Array) -> Array:
+    def unwrap_to_requested(self, q: Array) -> Array:
         """Shift the angles of q by whole turns, next to the requested ones."""
         shifted = q.copy()
-        shifted[self.turning] = (self.q + _wrap_angles(q - self.q))[self.turning]
+        shifted[self.angle_indices] = (self.q + _wrap_angles(q - self.q))[self.angle_indices]
         return shifted
 
-    def toward(self, q: Array) -> Array:
+    def change_toward(self, q: Array) -> Array:
         """Change (nu,) along the speeds from q to the requested coordinates."""
-        deviation, layout, change = self.off(q), self.packed.layout, np.zeros(self.packed.layout.nu)
-        for hinge in self.packed.described.hinge:
+        deviation, layout, change = (
+            self.deviation_of(q),
+            self.packed.layout,
+            np.zeros(self.packed.layout.nu),
+        )
+        for hinge in self.packed.user_scene.hinge:
             slots = layout.hinges[hinge.name]
             if slots.nq == slots.nu:
                 change[slots.u_slice] = -deviation[slots.q_slice]
         return change
 
-    def drawn(self, draw: np.random.Generator) -> Array:
+    def random_change(self, draw: np.random.Generator) -> Array:
         """Random change (nu,) along the speeds: up to half a turn or the scene length."""
         change, layout = np.zeros(self.packed.layout.nu), self.packed.layout
-        for hinge in self.packed.described.hinge:
+        for hinge in self.packed.user_scene.hinge:
             slots, facts = layout.hinges[hinge.name], hinge.facts
             sliding_speeds = {*range(slots.nu)} if facts is None else {*facts.slides}
             for k in range(slots.nu):
@@ -142,41 +146,52 @@ class BranchSearch:
     def __init__(
         self, assembly: Assembly, wishes: RequestedCoordinates, first: Array, much: float = 0.0
     ) -> None:
-        self._assembly, self._wishes, self._first, self._much = assembly, wishes, first, much
+        self._assembly, self._requested, self._first, self._max_gap = assembly, wishes, first, much
 
     def is_near(self) -> bool:
         """True if `first` is at the requested coordinates, so that no branch is nearer."""
-        return self._wishes.distance(self._first) < _NEAREST_DISTANCE
+        return self._requested.distance(self._first) < _NEAREST_DISTANCE
 
-    def nearest(self) -> Array:
+    def nearest_state(self) -> Array:
         """State (nq,) on the nearest branch: `first` unless another branch is nearer."""
-        if len(self.found) < 2:
+        if len(self.branches) < 2:
             return self._first
-        nearest_branch, first_distance = self.found[0], self._wishes.distance(self._settled_first)
+        nearest_branch, first_distance = (
+            self.branches[0],
+            self._requested.distance(self._nearest_to_request),
+        )
         if nearest_branch.distance < first_distance - _MIN_IMPROVEMENT:
-            return self._wishes.nearest_turn(nearest_branch.q)
+            return self._requested.unwrap_to_requested(nearest_branch.q)
         return self._first
 
     @cached_property
-    def found(self) -> tuple[Branch, ...]:
+    def branches(self) -> tuple[Branch, ...]:
         """Branches found, the nearest first."""
-        starts = (self._assembly.nearest_closed(start, self._much) for start in self._starts())
+        starts = (
+            self._assembly.closed_state_near(start, self._max_gap) for start in self._start_states()
+        )
         closed_states = [closed for closed in starts if closed is not None]
-        requested, states = self._wishes, [self._settled_first if closed_states else self._first]
+        requested, states = (
+            self._requested,
+            [self._nearest_to_request if closed_states else self._first],
+        )
         for closed in closed_states:
-            nearest_state = self._settled(closed)
-            if all(self._apart(nearest_state, other) > _MAX_BRANCH_DISTANCE for other in states):
+            nearest_state = self._descend_branch(closed)
+            if all(
+                self._distance(nearest_state, known_state) > _MAX_BRANCH_DISTANCE
+                for known_state in states
+            ):
                 states.append(nearest_state)
         ranked = sorted(states, key=lambda q: round(requested.distance(q) / _MIN_IMPROVEMENT))
         return tuple(
-            Branch(requested.distance(q), q, self._assembly.by_names(q))
-            for q in map(requested.nearest_turn, ranked)
+            Branch(requested.distance(q), q, self._assembly.coordinates_by_name(q))
+            for q in map(requested.unwrap_to_requested, ranked)
         )
 
-    def _starts(self) -> Iterator[Array]:
-        requested, engine = self._wishes, self._assembly.calls.engine
+    def _start_states(self) -> Iterator[Array]:
+        requested, engine = self._requested, self._assembly.calls.engine
         placed_q = _start_from_placed_bodies(
-            engine.packed, requested.q, self._assembly.held, self._much
+            engine.packed, requested.q, self._assembly.fixed_hinges, self._max_gap
         )
         if placed_q is not None:
             yield placed_q
@@ -187,22 +202,23 @@ class BranchSearch:
             else 0
         )
         for _ in range(start_count):
-            change = requested.drawn(random_generator) * self._assembly.free
-            yield self._assembly.calls.moved(requested.q, change)
+            change = requested.random_change(random_generator) * self._assembly.free_speed_mask
+            yield self._assembly.calls.move(requested.q, change)
 
     @cached_property
-    def _settled_first(self) -> Array:
-        return self._settled(self._first)
+    def _nearest_to_request(self) -> Array:
+        return self._descend_branch(self._first)
 
-    def _settled(self, q: Array) -> Array:
+    def _descend_branch(self, q: Array) -> Array:
         """Move q on its branch to the state nearest to the requested coordinates."""
-        calls, distance = self._assembly.calls, self._wishes.distance(q)
+        calls, distance = self._assembly.calls, self._requested.distance(q)
         for _ in range(_MAX_STEPS):
             try:
-                requested_speeds = self._assembly.free * self._wishes.toward(q)
+                requested_speeds = self._assembly.free_speed_mask * self._requested.change_toward(q)
                 speeds = (
                     requested_speeds
-                    + self._assembly.free * calls.correction(calls.slip, q, requested_speeds)[0]
+                    + self._assembly.free_speed_mask
+                    * calls.correction(calls.velocity_level, q, requested_speeds)[0]
                 )
                 speeds *= float(requested_speeds @ speeds) / max(
                     float(speeds @ speeds), _NEGLIGIBLE_SQUARE
@@ -210,21 +226,23 @@ class BranchSearch:
                 length = float(np.abs(speeds).max(initial=0.0))
                 if length < _NEGLIGIBLE_STEP:
                     break
-                ahead_q = calls.moved(q, speeds * min(1.0, _MAX_STEP / length))
-                closed_q = self._assembly.nearest_closed(ahead_q, self._much)
+                ahead_q = calls.move(q, speeds * min(1.0, _MAX_STEP / length))
+                closed_q = self._assembly.closed_state_near(ahead_q, self._max_gap)
             except MstmmError:
                 break
             if (
                 closed_q is None
-                or not self._wishes.distance(closed_q) < distance - _MIN_IMPROVEMENT
+                or not self._requested.distance(closed_q) < distance - _MIN_IMPROVEMENT
             ):
                 break
-            q, distance = closed_q, self._wishes.distance(closed_q)
+            q, distance = closed_q, self._requested.distance(closed_q)
         return q
 
-    def _apart(self, one: Array, other: Array) -> float:
-        difference = one - other
-        difference[self._wishes.turning] = _wrap_angles(difference[self._wishes.turning])
+    def _distance(self, first_q: Array, second_q: Array) -> float:
+        difference = first_q - second_q
+        difference[self._requested.angle_indices] = _wrap_angles(
+            difference[self._requested.angle_indices]
+        )
         return float(np.abs(difference).max(initial=0.0))
 
 
@@ -277,7 +295,7 @@ def _start_from_placed_bodies(
 
     None if the tree is the same, if the loops do not close from there, and for large scenes.
     """
-    scene = packed.described
+    scene = packed.user_scene
     if len(scene.hinge) > _MAX_PLACED_HINGES or scene.beam or scene.elastic or packed.releases:
         return None
     cut_hinges = {
@@ -298,17 +316,17 @@ def _start_from_placed_bodies(
             Scene.model_construct(**fields), packed.elements.known, simplify=packed.simplify
         )
         start_q = _convert_q(q, packed, repacked)
-        closed_q = Assembly(LoopedEngine(repacked), start_q, kept).nearest_closed(start_q, much)
+        closed_q = Assembly(LoopedEngine(repacked), start_q, kept).closed_state_near(start_q, much)
     except MstmmError:  # the determining hinges form a cycle
         return None
     return None if closed_q is None else _convert_q(closed_q, repacked, packed)
 
 
-def _convert_q(q: Array, packed: PackedScene, other: PackedScene) -> Array:
+def _convert_q(q: Array, packed: PackedScene, target: PackedScene) -> Array:
     """Convert q (nq,) of a scene to that of the same scene with other cut hinges."""
-    converted = np.zeros(other.layout.nq)
-    for hinge in packed.described.hinge:
-        converted[other.layout.hinges[hinge.name].q_slice] = q[
+    converted = np.zeros(target.layout.nq)
+    for hinge in packed.user_scene.hinge:
+        converted[target.layout.hinges[hinge.name].q_slice] = q[
             packed.layout.hinges[hinge.name].q_slice
         ]
     return converted

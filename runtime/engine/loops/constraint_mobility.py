@@ -25,7 +25,7 @@ def row_mobilities(numbers: LoopWorkspace) -> Array:
     for closure in numbers.records.closures:
         for body, name in ((closure.inboard, "J_A"), (closure.outboard, "J_B")):
             if body >= 0:
-                columns, inverse = numbers.numbers_of(closure, name), body_masses.inverse(body)
+                columns, inverse = numbers.closure_matrix(closure, name), body_masses.inverse(body)
                 for direction, row in closure.rows.items():
                     column = columns[direction]
                     mobility[row] += column @ inverse @ column
@@ -36,34 +36,38 @@ def row_mobilities(numbers: LoopWorkspace) -> Array:
     return mobility
 
 
-def _coupling_mobility(numbers: LoopWorkspace, one: WrittenCoupling, masses: _BodyMasses) -> float:
+def _coupling_mobility(
+    numbers: LoopWorkspace, coupling: WrittenCoupling, masses: _BodyMasses
+) -> float:
     """Mobility C^T D^-1 C of a coupling, summed over its hinges.
 
     D is that of the single body of the hinge; a closing hinge counts like its rows.
     """
     mobility, closures = 0.0, {closure.frame: closure for closure in numbers.records.closures}
-    for place in one.columns:
-        derivatives = numbers.slopes_of(one, place)
-        if place not in closures:
-            mobility += _hinge_mobility(numbers.engine, place, derivatives, masses)
+    for tree_index in coupling.columns:
+        derivatives = numbers.coupling_derivatives(coupling, tree_index)
+        if tree_index not in closures:
+            mobility += _hinge_mobility(numbers.engine, tree_index, derivatives, masses)
             continue
-        closure = closures[place]
+        closure = closures[tree_index]
         for body, name in ((closure.inboard, "J_A"), (closure.outboard, "J_B")):
             if body >= 0:
-                column = derivatives @ numbers.numbers_of(closure, name)[: len(derivatives)]
+                column = derivatives @ numbers.closure_matrix(closure, name)[: len(derivatives)]
                 mobility += float(column @ masses.inverse(body) @ column)
     return mobility
 
 
-def _hinge_mobility(engine: LoopedEngine, place: int, slopes: Array, masses: _BodyMasses) -> float:
-    body, lib = engine.packed.system.body(place), engine.lib
+def _hinge_mobility(
+    engine: LoopedEngine, tree_index: int, slopes: Array, masses: _BodyMasses
+) -> float:
+    body, lib = engine.packed.system.body(tree_index), engine.lib
     free_speeds = [k for k in range(body.nu) if not body.imposed[k]]
-    start = int(engine.packed.written.blocks[place]) + int(lib.MSTMM_BLOCK_FIXED)
+    start = int(engine.packed.written.blocks[tree_index]) + int(lib.MSTMM_BLOCK_FIXED)
     start += int(lib.MSTMM_SPEED_H_FREE) * body.nu
     motion_subspace = engine.workspace_array()[start : start + 6 * len(free_speeds)].reshape(
         6, len(free_speeds)
     )
-    inertia = motion_subspace.T @ masses.matrix(place) @ motion_subspace + np.diag(
+    inertia = motion_subspace.T @ masses.matrix(tree_index) @ motion_subspace + np.diag(
         np.array(body.rotor)[free_speeds]
     )
     return float(slopes[free_speeds] @ _pseudo_inverse(inertia) @ slopes[free_speeds])
@@ -78,9 +82,9 @@ class _BodyMasses:
     """Mass matrices of single bodies about input ends and their inverses, cached by body data."""
 
     def __init__(self, engine: LoopedEngine) -> None:
-        self.engine, self.which = engine, engine.packed.system.which
+        self.engine, self.kind_indices = engine, engine.packed.system.distinct_indices
         self.distinct = list(engine.packed.system.distinct)
-        self.known: dict[tuple[Key, Numbers], tuple[Array, Array]] = {}
+        self.cache: dict[tuple[Key, Numbers], tuple[Array, Array]] = {}
 
     def matrix(self, body: int) -> Array:
         return self._both(body)[0]
@@ -89,14 +93,14 @@ class _BodyMasses:
         return self._both(body)[1]
 
     def _both(self, body: int) -> tuple[Array, Array]:
-        body_record = self.distinct[int(self.which[body])]
+        body_record = self.distinct[int(self.kind_indices[body])]
         kind = body_record.body, body_record.body_p
-        if kind not in self.known:
-            matrix = self._made(*kind)
-            self.known[kind] = matrix, _pseudo_inverse(matrix)
-        return self.known[kind]
+        if kind not in self.cache:
+            matrix = self._inertia_matrix(*kind)
+            self.cache[kind] = matrix, _pseudo_inverse(matrix)
+        return self.cache[kind]
 
-    def _made(self, body: Key, numbers: Numbers) -> Array:
+    def _inertia_matrix(self, body: Key, numbers: Numbers) -> Array:
         upper_triangle, engine = np.zeros(21), self.engine
         function = engine.packed.elements[body].functions["inertia"]
         c_function = engine.ffi.cast("int (*)(const double *, double *)", function)

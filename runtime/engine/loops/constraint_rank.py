@@ -19,7 +19,7 @@ from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure
 
 from ...packing.loops.system_variants import (
-    LOCKED,
+    LOCKING_GAP_FRACTION,
     characteristic_length,
     with_hinge_inertia,
     with_unit_masses,
@@ -52,24 +52,24 @@ class Rank:
     """Redundant rows of closed loops at a state.
 
     Attributes:
-        here: rows that are redundant at the state.
-        always: rows of `here` that are also redundant in closed states nearby.
-        going: rows of `always` that are removed; the others may replace another row of their hinge
-            that becomes redundant in a pose farther away.
+        redundant_here: rows that are redundant at the state.
+        always_redundant: rows of `redundant_here` that are also redundant in closed states nearby.
+        removed_rows: rows of `always_redundant` that are removed; the others may replace another
+            row of their hinge that becomes redundant in a pose farther away.
         states: examined states (nq,), the given one first.
         open: loads that are indeterminate because of redundant rows.
-        nearby: smallest number of redundant rows in any of the states.
-        stuck: True if all motions that close the loops to first order lead back to the pose, as
+        min_redundant_count: smallest number of redundant rows in any of the states.
+        is_stuck: True if all motions that close the loops to first order lead back to the pose, as
             with links stretched out in line.
     """
 
-    here: frozenset[int]
-    always: frozenset[int]
-    going: frozenset[int]
+    redundant_here: frozenset[int]
+    always_redundant: frozenset[int]
+    removed_rows: frozenset[int]
     states: tuple[Array, ...]
     open: IndeterminateLoads
-    nearby: int
-    stuck: bool = False
+    min_redundant_count: int
+    is_stuck: bool = False
 
 
 def find_rank(engine: LoopedEngine, q: Array) -> Rank:
@@ -84,7 +84,7 @@ def find_rank(engine: LoopedEngine, q: Array) -> Rank:
         list(redundant_here)
     ]
     states, is_stuck = _states_around(calls, q, redundant_here, pivot_levels)
-    locking_gap = LOCKED * characteristic_length(engine.packed.system)
+    locking_gap = LOCKING_GAP_FRACTION * characteristic_length(engine.packed.system)
     is_stuck = is_stuck and not _is_misfit_only(calls, q, redundant_here, locking_gap)
     redundant_there = [_redundant_rows(calls, state, pivot_levels) for state in states]
     always_redundant, nearby = (
@@ -114,20 +114,22 @@ def _states_around(
     """
     random_generator, distances, states = np.random.default_rng(0), list[float](), list[Array]()
 
-    def found(settled: float) -> Array | None:
+    def random_neighbour(settled: float) -> Array | None:
         near_q = _closed_neighbour(
             calls, q, random_generator.uniform(-1.0, 1.0, calls.engine.nu), settled
         )
         distances.extend([] if near_q is None else [_largest_change(calls, near_q - q)])
         return near_q
 
-    states = [near_q for _ in range(_NEIGHBOUR_COUNT) if (near_q := found(np.inf)) is not None]
+    states = [
+        near_q for _ in range(_NEIGHBOUR_COUNT) if (near_q := random_neighbour(np.inf)) is not None
+    ]
     is_distant = bool(distances) and min(distances) >= _MIN_DISTANCE_RATIO * _NEIGHBOUR_DISTANCE
     if is_distant and all(_redundant_rows(calls, near_q, level) == here for near_q in states):
         return states, False
     smooth_states = list[Array]()
     for _ in range(_MAX_TRIALS):
-        near_q = found(_STATE_ACCURACY)
+        near_q = random_neighbour(_STATE_ACCURACY)
         if near_q is None or distances[-1] < _MIN_DISTANCE_RATIO * _NEIGHBOUR_DISTANCE:
             continue
         if _continues_smoothly(
@@ -161,7 +163,7 @@ def geometric_loop_calls(engine: LoopedEngine, q: Array) -> LoopCalls:
     ).mobility
     slides = {
         packed.hinge_position[hinge.name]: hinge.facts.slides
-        for hinge in packed.described.hinge if hinge.facts is not None
+        for hinge in packed.user_scene.hinge if hinge.facts is not None
     }  # fmt: skip
     return LoopCalls(
         LoopedEngine(packed_system(with_hinge_inertia(packed.system, slides), packed)), q, mobility
@@ -198,8 +200,8 @@ def _interchangeable_rows(calls: LoopCalls, q: Array, left_out: frozenset[int]) 
 def _redundant_rows(calls: LoopCalls, q: Array, level: Array) -> frozenset[int]:
     """Rows whose pivots are below their level if the preceding rows are satisfied."""
     for row, floor in enumerate(level.tolist()):
-        calls.records.judge(row, floor)
-    calls.correction(calls.slip, q, np.zeros(calls.engine.nu))
+        calls.records.set_pivot_floor(row, floor)
+    calls.correction(calls.velocity_level, q, np.zeros(calls.engine.nu))
     return frozenset(np.flatnonzero(calls.inverses() == 0.0).tolist())
 
 
@@ -233,7 +235,9 @@ def _is_misfit_only(calls: LoopCalls, q: Array, left: frozenset[int], apart: flo
                 or _largest_change(calls, near_q - q) < _MIN_DISTANCE_RATIO * _FAR_DISTANCE
             ):
                 return False
-            gaps = np.abs(calls.correction(calls.gap, near_q, np.zeros(calls.engine.nu))[1])
+            gaps = np.abs(
+                calls.correction(calls.position_level, near_q, np.zeros(calls.engine.nu))[1]
+            )
             if gaps[list(left)].max() > apart:
                 return False
     except NumericalFailure:
@@ -259,21 +263,21 @@ def _continues_smoothly(calls: LoopCalls, q: Array, speeds: Array, level: Array)
 
 
 def _move_along(
-    calls: LoopCalls, q: Array, speeds: Array, way: float, level: Array
+    calls: LoopCalls, q: Array, speeds: Array, distance: float, level: Array
 ) -> Array | None:
-    """Move q (nq,) by `way` (rad, m) along projected speeds.
+    """Move q (nq,) by `distance` (rad, m) along projected speeds.
 
     Only rows with pivots above `level` are satisfied.  None if no speeds remain.
     """
     for row, floor in enumerate(level.tolist()):
-        calls.records.judge(row, floor)
-    tangent = speeds + calls.correction(calls.slip, q, speeds)[0]
+        calls.records.set_pivot_floor(row, floor)
+    tangent = speeds + calls.correction(calls.velocity_level, q, speeds)[0]
     length = float(np.abs(tangent).max(initial=0.0))
     if not length > 1e-9:
         return None
-    near_q = calls.moved(q, tangent * (way / length))
-    factor = min(way / max(_largest_change(calls, near_q - q), _CLOSED_GAP), _MAX_CUT_FACTOR)
-    return calls.moved(q, tangent * (factor * way / length)) if factor > 1.0 else near_q
+    near_q = calls.move(q, tangent * (distance / length))
+    factor = min(distance / max(_largest_change(calls, near_q - q), _CLOSED_GAP), _MAX_CUT_FACTOR)
+    return calls.move(q, tangent * (factor * distance / length)) if factor > 1.0 else near_q
 
 
 def _close(
@@ -285,15 +289,15 @@ def _close(
     """
     zero_speeds, compliance = np.zeros(calls.engine.nu), _INITIAL_COMPLIANCE
     for row in range(calls.count):
-        calls.records.judge(row, np.inf if row in left else 0.0)
+        calls.records.set_pivot_floor(row, np.inf if row in left else 0.0)
     for _ in range(_MAX_STEPS):
-        change, gaps = calls.correction(calls.gap, near, zero_speeds, compliance)
+        change, gaps = calls.correction(calls.position_level, near, zero_speeds, compliance)
         gaps[list(left)] = 0.0
         largest_gap = float(np.abs(gaps).max(initial=0.0))
         if largest_gap < _CLOSED_GAP and float(np.abs(change).max(initial=0.0)) < settled:
             return near
         near, compliance = (
-            calls.moved(near, change),
+            calls.move(near, change),
             min(_INITIAL_COMPLIANCE, _COMPLIANCE_PER_GAP * largest_gap),
         )
     return None

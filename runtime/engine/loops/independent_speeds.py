@@ -36,8 +36,8 @@ _MAX_CONDITION = 1e8
 class IndependentSpeeds:
     """Independent speeds and motions of one packed scene with closed loops.
 
-    `free` are the indices of the speeds that are not prescribed, `sizes` (nu,) the characteristic
-    scales of the speeds.
+    `free_indices` are the indices of the speeds that are not prescribed, `sizes` (nu,) the
+    characteristic scales of the speeds.
     """
 
     def __init__(
@@ -50,11 +50,11 @@ class IndependentSpeeds:
         self._loops = closed.loops
 
     @cached_property
-    def places(self) -> tuple[int, ...]:
+    def indices(self) -> tuple[int, ...]:
         """Indices of the independent speeds, chosen at the initial state."""
-        return self.chosen(self._start)
+        return self.select(self._start)
 
-    def chosen(self, q: Array) -> tuple[int, ...]:
+    def select(self, q: Array) -> tuple[int, ...]:
         """Choose the indices of speeds that determine all others at q (nq,).
 
         Each is the first in the scene that distinguishes the remaining motions, in characteristic
@@ -63,7 +63,7 @@ class IndependentSpeeds:
         scaled_motions = self._motions(q) / self.sizes[:, None]
         return tuple(sorted(select_rows(scaled_motions, self._free.tolist(), _SELECTION_RATIO)[0]))
 
-    def settling(
+    def select_fixed_speeds(
         self, q: Array, shapes: Sequence[int], kept: Sequence[int], wished: Sequence[int]
     ) -> tuple[tuple[int, ...], tuple[int, ...]]:
         """Choose speeds that fix a mechanism at q while `shapes` settle.
@@ -86,13 +86,13 @@ class IndependentSpeeds:
             sorted(select_rows(remaining, shapes, _SELECTION_RATIO)[0])
         )
 
-    def following(self, q: Array, places: Sequence[int]) -> Array:
-        """Matrix N (nu, n) of u = N v for the independent speeds v at the indices `places`.
+    def motion_matrix(self, q: Array, speed_indices: Sequence[int]) -> Array:
+        """Matrix N (nu, n) of u = N v for the independent speeds v at the indices `speed_indices`.
 
         Raises NumericalFailure if these do not determine the others, as at a dead centre, and in
         singular poses.
         """
-        motions, indices = self._motions(q), list(places)
+        motions, indices = self._motions(q), list(speed_indices)
         scaled_rows = motions[indices] / self.sizes[indices, None]
         row_count, motion_count = scaled_rows.shape
         is_branching = self._loops.singular and motion_count == self._loops.mobility
@@ -102,51 +102,52 @@ class IndependentSpeeds:
             and (not motion_count or np.linalg.cond(scaled_rows) < _MAX_CONDITION)
         ):
             return np.asarray(motions @ np.linalg.inv(motions[indices]))
-        self._refuse_open(q)
+        self._check_closed(q)
         names = ", ".join(self._calls.engine.packed.layout.u_name(k) for k in indices)
         raise NumericalFailure(
-            f"the loops leave {motion_count} motions here, which {names or 'no speed'} cannot "
-            f"distinguish: "
-            "a dead centre or a singular pose; use a state near it"
+            f"the mobility is {motion_count} at this state, but {names or 'no speed'} cannot be "
+            "independent speeds: a dead centre or a singular configuration; use a nearby state"
         )
 
-    def _refuse_open(self, q: Array) -> None:
-        gaps = np.abs(self._calls.correction(self._calls.gap, q, np.zeros(len(self.sizes)))[1])
+    def _check_closed(self, q: Array) -> None:
+        gaps = np.abs(
+            self._calls.correction(self._calls.position_level, q, np.zeros(len(self.sizes)))[1]
+        )
         row = int(gaps.argmax())
         if gaps[row] > _MAX_GAP:
             raise NumericalFailure(
-                f"the loop that {self._calls.closing(row)} closes is open by {gaps[row]:.3g} at "
-                "this q; use that of model.assemble(q)"
+                f"the loop closed by {self._calls.closing_label(row)} has a position gap of "
+                f"{gaps[row]:.3g} at this q; use the q of model.assemble(q)"
             )
 
-    def driving(self, q: Array, speed: int) -> Array:
+    def prescribed_motion(self, q: Array, speed: int) -> Array:
         """All speeds (nu,) for a unit of one prescribed speed, with the other prescribed ones zero.
 
         nan if the loops do not permit that motion.
         """
-        motion = self._allowed(q, np.eye(1, len(self.sizes), speed)[0])
-        errors = self._slips(q, motion)[1]
+        motion = self._project(q, np.eye(1, len(self.sizes), speed)[0])
+        errors = self._correction_and_errors(q, motion)[1]
         return (
             motion
             if np.abs(errors).max(initial=0.0) < _MOTION_ROUNDING
             else np.full_like(motion, np.nan)
         )
 
-    def moved(self, q: Array, speeds: Array) -> Array:
+    def move(self, q: Array, speeds: Array) -> Array:
         """Move q (nq,) by a small step along speeds (nu,); loops close to first order."""
-        return self._calls.moved(q, speeds)
+        return self._calls.move(q, speeds)
 
     @property
-    def free(self) -> list[int]:
+    def free_indices(self) -> list[int]:
         """Indices of the speeds that are not prescribed."""
         return list(map(int, self._free))
 
     @cached_property
-    def rows_of_speeds(self) -> frozenset[int]:
+    def speed_rows(self) -> frozenset[int]:
         """Rows that constrain only speeds: of rolling discs and of couplings of speeds."""
         records = self._calls.records
         speed_directions = {
-            closure.frame: closure.of_speeds
+            closure.frame: closure.speed_directions
             for closure in self._calls.engine.packed.system.closures
         }
         rows = {
@@ -157,13 +158,13 @@ class IndependentSpeeds:
             rows | {coupling.row for coupling in records.couplings if coupling.coupling.of_speeds}
         )
 
-    def without_slip(self, q: Array, u: Array) -> Array:
+    def remove_velocity_errors(self, q: Array, u: Array) -> Array:
         """Nearest speeds to u (nu,) that satisfy all rows; prescribed speeds are unchanged."""
-        return np.asarray(u + self._calls.correction(self._calls.slip, q, u)[0])
+        return np.asarray(u + self._calls.correction(self._calls.velocity_level, q, u)[0])
 
-    def slip(self, q: Array, u: Array) -> Array:
+    def velocity_errors(self, q: Array, u: Array) -> Array:
         """Velocity errors (rows,): J(q) u up to sign."""
-        return self._slips(q, u)[1]
+        return self._correction_and_errors(q, u)[1]
 
     def _motions(self, q: Array) -> Array:
         """Basis (nu, n) of the motions at q, orthonormal in characteristic scales."""
@@ -171,37 +172,37 @@ class IndependentSpeeds:
         random_generator = np.random.default_rng(0)
         trials = np.zeros((count, len(self.sizes)))
         trials[:, self._free] = random_generator.standard_normal((count, len(self._free)))
-        columns = [self._allowed(q, trial * self.sizes) for trial in trials]
+        columns = [self._project(q, trial * self.sizes) for trial in trials]
         scaled = np.reshape(columns, trials.shape).T / self.sizes[:, None]
         left_vectors, singular_values, _ = np.linalg.svd(scaled, full_matrices=False)
         is_kept = singular_values > _MOTION_ROUNDING * singular_values.max(initial=1.0)
         return np.asarray(left_vectors[:, is_kept] * self.sizes[:, None])
 
-    def _allowed(self, q: Array, speeds: Array) -> Array:
+    def _project(self, q: Array, speeds: Array) -> Array:
         """Speeds (nu,) projected on the constraints."""
-        return speeds + self._slips(q, speeds)[0]
+        return speeds + self._correction_and_errors(q, speeds)[0]
 
-    def _slips(self, q: Array, speeds: Array) -> tuple[Array, Array]:
+    def _correction_and_errors(self, q: Array, speeds: Array) -> tuple[Array, Array]:
         """Correction (nu,) of speeds and velocity errors (rows,), without those at rest.
 
         At rest the velocity errors are those of time-dependent couplings.
         """
-        correction, errors = self._calls.correction(self._calls.slip, q, speeds)
+        correction, errors = self._calls.correction(self._calls.velocity_level, q, speeds)
         rest_correction, rest_errors = self._calls.correction(
-            self._calls.slip, q, np.zeros_like(speeds)
+            self._calls.velocity_level, q, np.zeros_like(speeds)
         )
         return correction - rest_correction, errors - rest_errors
 
 
 def select_rows(
-    left: Array, places: Sequence[int], well: float = _SELECTION_RATIO
+    left: Array, row_indices: Sequence[int], well: float = _SELECTION_RATIO
 ) -> tuple[list[int], Array]:
     """Choose rows that distinguish motions (nu, n), orthonormal in characteristic scales.
 
-    Each row is the first of `places` that distinguishes the remaining motions at least 1 / `well`
+    Each row is the first of `row_indices` that separates the remaining motions at least 1 / `well`
     times as well as any other.  Also returns the motions in which no chosen row moves.
     """
-    candidates, selected = list(places), list[int]()
+    candidates, selected = list(row_indices), list[int]()
     for _ in range(left.shape[1]):
         row_norms = np.linalg.norm(left[candidates], axis=1)
         if not row_norms.max(initial=0.0) > 1 / _MAX_RATIO:
@@ -211,7 +212,7 @@ def select_rows(
     return selected, left
 
 
-def _motions_without(left: Array, place: int) -> Array:
+def _motions_without(left: Array, row_index: int) -> Array:
     """Motions (nu, n) without the component that changes one speed."""
-    direction = left[place] / np.linalg.norm(left[place])
+    direction = left[row_index] / np.linalg.norm(left[row_index])
     return np.asarray(left - np.outer(left @ direction, direction))

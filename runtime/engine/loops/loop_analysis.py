@@ -14,7 +14,7 @@ from mstmm.errors import LoopClosureError, MstmmError, NumericalFailure, SceneEr
 
 from ...packing.initial_state import start_values
 from ...packing.loops.system_variants import (
-    LOCKED,
+    LOCKING_GAP_FRACTION,
     characteristic_length,
     with_coupling_values,
     with_row_choice,
@@ -59,62 +59,67 @@ class LoopAnalysis:
     """Closed-loop analysis of a scene: cut hinges, rows, rank, redundancy and mobility.
 
     Attributes:
-        cut: hinges that close loops; the choice within a loop affects only the computing time.
-        rows: (hinge, direction) of every row, in the order in which they are closed: "x" to "mz"
-            for the outboard axis of the hinge nearest to its direction, "u1", ... for its own
-            speeds; or (constraint, direction): "length", "normal", "x" and "y" of rolling,
+        cut_hinges: hinges that close loops; the choice within a loop affects only the computing
+            time.
+        constraint_rows: (hinge, direction) of every row, in the order in which they are closed: "x"
+            to "mz" for the outboard axis of the hinge nearest to its direction, "u1", ... for its
+            own speeds; or (constraint, direction): "length", "normal", "x" and "y" of rolling,
             "across1" and "across2" of a curve.
         rank: number of independent rows.
-        nearby: rank in closed states nearby; greater than `rank` in a singular pose.
-        redundant: redundant rows; the loads along them are indeterminate.
-        momentary: rows of `redundant` that are redundant only in this pose.
-        not_unique: indeterminate loads by name: components of hinge loads, "fx" to "mz" along and
-            about the outboard axes, and directions of the loads of constraints and couplings.
-            Rigid bodies do not determine them: results show one of many distributions.
-        misfit: largest position gap (m, rad) at the start of rows that are redundant up to a
-            misfit, with the row; 0 and two empty strings if there is none.
+        generic_rank: rank in closed states nearby; greater than `rank` in a singular pose.
+        redundant_rows: redundant rows; the loads along them are indeterminate.
+        redundant_in_this_pose: rows of `redundant_rows` that are redundant only in this pose.
+        indeterminate_reactions: indeterminate loads by name: components of hinge loads, "fx" to
+            "mz" along and about the outboard axes, and directions of the loads of constraints and
+            couplings. Rigid bodies do not determine them: results show one of many distributions.
+        redundancy_gap: largest position gap (m, rad) at the start of rows that are redundant up to
+            a misfit, with the row; 0 and two empty strings if there is none.
         mobility: number of degrees of freedom.
-        shapes: number of these that are rates of the shapes of flexible bodies: all of them unless
-            some are needed to satisfy rows.
-        width: largest number of rows that are open across one hinge at a time.
+        flexible_mobility: number of these that are rates of the shapes of flexible bodies: all of
+            them unless some are needed to satisfy rows.
+        max_open_rows: largest number of rows that are open across one hinge at a time.
     """
 
-    cut: tuple[str, ...] = ()
-    rows: tuple[tuple[str, str], ...] = ()
+    cut_hinges: tuple[str, ...] = ()
+    constraint_rows: tuple[tuple[str, str], ...] = ()
     rank: int = 0
-    nearby: int = 0
-    redundant: tuple[tuple[str, str], ...] = ()
-    momentary: tuple[tuple[str, str], ...] = ()
+    generic_rank: int = 0
+    redundant_rows: tuple[tuple[str, str], ...] = ()
+    redundant_in_this_pose: tuple[tuple[str, str], ...] = ()
     mobility: int = 0
-    width: int = 0
-    not_unique: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    misfit: tuple[float, str, str] = (0.0, "", "")
-    shapes: int = 0
-    found_by: Callable[[], tuple[Branch, ...]] = field(default=tuple, repr=False, compare=False)
-    decided_by: Callable[[], tuple[str, ...]] = field(default=tuple, repr=False, compare=False)
+    max_open_rows: int = 0
+    indeterminate_reactions: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    redundancy_gap: tuple[float, str, str] = (0.0, "", "")
+    flexible_mobility: int = 0
+    find_branches: Callable[[], tuple[Branch, ...]] = field(
+        default=tuple, repr=False, compare=False
+    )
+    speed_choice: Callable[[], tuple[str, ...]] = field(default=tuple, repr=False, compare=False)
 
     @property
     def singular(self) -> bool:
         """True if the start is a singular configuration, with lower rank than states nearby."""
-        return self.nearby > self.rank
+        return self.generic_rank > self.rank
 
     @property
-    def counted(self) -> str:
+    def summary(self) -> str:
         """Summary of rows, rank and mobility."""
-        shapes_text = f", of them {self.shapes} of shapes" if self.shapes else ""
-        speeds_text = "1 speed" if self.mobility == 1 else f"{self.mobility} speeds"
-        return f"{self.rank} of {len(self.rows)} rows count, {speeds_text} left{shapes_text}"
+        shapes_text = (
+            f" ({self.flexible_mobility} of shape functions)" if self.flexible_mobility else ""
+        )
+        count = len(self.constraint_rows)
+        return f"{self.rank} of {count} rows independent, mobility {self.mobility}{shapes_text}"
 
-    def repeated(self, most: int) -> str:
-        """Text of `redundant` for messages, with at most `most` names."""
-        row_names = ", ".join(f"{word} of {name}" for name, word in self.redundant[:most])
-        return row_names + (" ..." if len(self.redundant) > most else "")
+    def redundant_text(self, most: int) -> str:
+        """Text of `redundant_rows` for messages, with at most `most` names."""
+        row_names = ", ".join(f"{word} of {name}" for name, word in self.redundant_rows[:most])
+        return row_names + (" ..." if len(self.redundant_rows) > most else "")
 
     @property
-    def open_loads(self) -> str:
-        """Text of `not_unique` for messages, with the first names only."""
+    def indeterminate_text(self) -> str:
+        """Text of `indeterminate_reactions` for messages, with the first names only."""
         names_by_components: dict[tuple[str, ...], list[str]] = {}
-        for name, components in self.not_unique.items():
+        for name, components in self.indeterminate_reactions.items():
             names_by_components.setdefault(components, []).append(name)
         return "; ".join(
             f"{' '.join(components)} of "
@@ -128,15 +133,15 @@ class LoopAnalysis:
 
         The first is nearest to the start and is that of the model.
         """
-        return self.found_by()
+        return self.find_branches()
 
     @property
-    def independent(self) -> tuple[str, ...]:
+    def independent_speeds(self) -> tuple[str, ...]:
         """Names of the independent speeds; their number is the mobility.
 
         They determine all others; mass matrices and linear models of the mechanism refer to them.
         """
-        return self.decided_by()
+        return self.speed_choice()
 
 
 class LoopStart:
@@ -147,12 +152,12 @@ class LoopStart:
 
     def __init__(self, engine: LoopedEngine, free_speeds: int) -> None:
         packed, self.engine = engine.packed, engine
-        self._whole = engine  #: with all rows
-        self._found: tuple[Branch, ...] = ()
-        hinges = [hinge for hinge in packed.described.hinge if not hinge.is_weld]
+        self._full_engine = engine  #: with all rows
+        self._found_branches: tuple[Branch, ...] = ()
+        hinges = [hinge for hinge in packed.user_scene.hinge if not hinge.is_weld]
         held_hinges = [hinge.name for hinge in hinges if hinge.hold]
         #: Hinges with initial speeds that are kept.
-        self.fast = [
+        self.fast_hinges = [
             hinge.name for hinge in hinges
             if hinge.drive is None and hinge.initial is not None and any(hinge.initial.u or ())
         ]  # fmt: skip
@@ -163,21 +168,23 @@ class LoopStart:
         try:
             near_q = self._assembly(q, held_hinges).positions(q, _MAX_MISFIT * length)
         except LoopClosureError as error:
-            extra_text = self._too_many(q, held_hinges, free_speeds)
+            extra_text = self._excess_hold_text(q, held_hinges, free_speeds)
             raise LoopClosureError(f"{error}{extra_text}", error.gap, error.pose) from None
         near_q = self._nearest(q, near_q, held_hinges, _MAX_MISFIT * length)
         try:
-            self._begin(near_q, u, held_hinges, free_speeds, calls)
+            self._set_start(near_q, u, held_hinges, free_speeds, calls)
         except LoopClosureError:  # the gap is not a misfit: it closes farther away
             near_q = self._assembly(near_q, held_hinges).positions(
                 near_q, _MAX_MISFIT * length, rough=False
             )
             self.engine = engine
-            self._begin(near_q, u, held_hinges, free_speeds, calls)
-        if self._whole is not self.engine:
-            self.engine.packed.behind = partial(_open_loop_cause, self._whole, self.start[0])
+            self._set_start(near_q, u, held_hinges, free_speeds, calls)
+        if self._full_engine is not self.engine:
+            self.engine.packed.find_loop_cause = partial(
+                _open_loop_cause, self._full_engine, self.start[0]
+            )
 
-    def _begin(
+    def _set_start(
         self, near: Array, u: Array, holds: Collection[str], free_speeds: int, calls: LoopCalls
     ) -> None:
         """Find the rank of the rows at `near` (nq,), which is closed up to misfits; start there.
@@ -185,31 +192,31 @@ class LoopStart:
         `calls` are those of all rows.  Raises LoopClosureError if independent rows do not close,
         SceneError if the mechanism cannot move.
         """
-        locking_gap = LOCKED * characteristic_length(self.engine.packed.system)
-        self._keep(near)
-        self._whole = self.engine
-        self.loops, redundant_names = self._judged(near, free_speeds)
-        self._refuse_structure()
+        locking_gap = LOCKING_GAP_FRACTION * characteristic_length(self.engine.packed.system)
+        self._fix_coupling_values(near)
+        self._full_engine = self.engine
+        self.loops, redundant_names = self._analyse(near, free_speeds)
+        self._check_mobility()
         self.start = self._assembly(near, holds).positions(near), u
         try:
-            self.start = self.assembled(near, u, holds, self.fast)
+            self.start = self.assemble(near, u, holds, self.fast_hinges)
         except SceneError:
-            self._refuse_locked(calls, redundant_names, locking_gap)
+            self._check_redundancy_gaps(calls, redundant_names, locking_gap)
             raise
         self.engine.packed.model.loops_singular = int(self.loops.singular)
         self.engine.packed.model.refines = count_refinements(
             self.engine, *self.start, self.loops.mobility
         )
-        self._refuse_locked(calls, redundant_names, locking_gap)
+        self._check_redundancy_gaps(calls, redundant_names, locking_gap)
 
     def _nearest(self, q: Array, near: Array, holds: Collection[str], much: float) -> Array:
         """State `near`, reached from the start q (nq,), or a state on a nearer branch."""
-        self._wishes = RequestedCoordinates(self.engine.packed, q, holds)
-        search = BranchSearch(self._assembly(q, holds), self._wishes, near, much)
+        self._requested = RequestedCoordinates(self.engine.packed, q, holds)
+        search = BranchSearch(self._assembly(q, holds), self._requested, near, much)
         if search.is_near():
             return near
-        nearest_q = search.nearest()
-        self._found = search.found
+        nearest_q = search.nearest_state()
+        self._found_branches = search.branches
         return nearest_q
 
     @property
@@ -218,34 +225,34 @@ class LoopStart:
 
         If the start was closed, the search happens at the first access.
         """
-        if not self._found:
-            held_hinges = self._wishes.kept
+        if not self._found_branches:
+            held_hinges = self._requested.kept_hinges
             search = BranchSearch(
-                self._assembly(self.start[0], held_hinges), self._wishes, self.start[0]
+                self._assembly(self.start[0], held_hinges), self._requested, self.start[0]
             )
-            self._found = search.found
-        return self._found
+            self._found_branches = search.branches
+        return self._found_branches
 
-    def nearest(
+    def assemble_nearest(
         self, q: Array, u: Array, holds: Collection[str], fast: Collection[str], t: float
     ) -> tuple[Array, Array]:
-        """Assemble like `assembled`, on the branch nearest to q of those found."""
+        """Assemble like `assemble`, on the branch nearest to q of those found."""
         assembly = self._assembly(q, holds, t)
         near_q = assembly.positions(q)
         search = BranchSearch(
             assembly, RequestedCoordinates(self.engine.packed, q, holds, stated=False), near_q
         )
-        near_q = near_q if search.is_near() else search.nearest()
+        near_q = near_q if search.is_near() else search.nearest_state()
         return near_q, self._assembly(near_q, fast, t).speeds(near_q, u)
 
-    def led(self, q: Array, to: Array, holds: Collection[str], t: float = 0.0) -> Array:
+    def follow_branch(self, q: Array, to: Array, holds: Collection[str], t: float = 0.0) -> Array:
         """Move the coordinates of `holds` from a closed q (nq,) to those of `to` on one branch.
 
         Small steps keep the state on its branch; drives and couplings have their values at t (s).
         Raises LoopClosureError if the branch ends before.
         """
         layout, is_kept = self.engine.packed.layout, np.zeros(len(q), bool)
-        driven = {hinge.name for hinge in self.engine.packed.described.hinge if hinge.drive}
+        driven = {hinge.name for hinge in self.engine.packed.user_scene.hinge if hinge.drive}
         for name in {*holds, *driven}:
             is_kept[layout.hinges[name].q_slice] = True
         change = np.where(is_kept, to - q, 0.0)
@@ -255,7 +262,7 @@ class LoopStart:
             q = self._assembly(next_q, {*holds, *driven}, t).positions(next_q)
         return q
 
-    def assembled(
+    def assemble(
         self, q: Array, u: Array, holds: Collection[str], fast: Collection[str], t: float = 0.0
     ) -> tuple[Array, Array]:
         """Nearest (q, u) that satisfies all constraints at t (s).
@@ -267,22 +274,22 @@ class LoopStart:
         return q, self._assembly(q, fast, t).speeds(q, u)
 
     def _assembly(self, q: Array, hinges: Collection[str], t: float = 0.0) -> Assembly:
-        return RotorAssembly(self.engine, q, hinges, self._sharing, t)
+        return RotorAssembly(self.engine, q, hinges, self._shared_drives_note, t)
 
-    def _sharing(self, q: Array) -> str:
+    def _shared_drives_note(self, q: Array) -> str:
         """Message part about drives of the same degree of freedom near q, or ""."""
-        return shared_drives_text(self._whole, q)
+        return shared_drives_text(self._full_engine, q)
 
-    def _keep(self, q: Array) -> None:
+    def _fix_coupling_values(self, q: Array) -> None:
         """Set the value of couplings without one to that at q."""
         packed = self.engine.packed
-        if any(coupling.kept is None for coupling in packed.system.couplings):
+        if any(coupling.constant is None for coupling in packed.system.couplings):
             values = LoopCalls(self.engine, q).values()
             self.engine = LoopedEngine(
                 packed_system(with_coupling_values(packed.system, values.tolist()), packed)
             )
 
-    def _judged(
+    def _analyse(
         self, q: Array, free_speeds: int
     ) -> tuple[LoopAnalysis, dict[int, tuple[str, str]]]:
         """Analyse the loops near q; also return the rows that are always redundant, by index."""
@@ -292,90 +299,89 @@ class LoopStart:
         for name, word in (names[row] for row in sorted(rank.open.rows)):
             if name not in packed.layout.hinges:
                 load_names[name] = (*load_names.get(name, ()), word)
-        if rank.stuck and not self._is_led:
-            remedy = (
-                "give the flexible bodies there axial shapes too, or let one of their ends slide"
-            )
+        if rank.is_stuck and not self._has_prescribed_motion:
+            remedy = "give these flexible bodies axial shapes, or let one of their ends slide"
             if not packed.flexible:
-                remedy = "change a length or the place of a hinge slightly, so that they close in"
-                remedy += " more than this pose"
+                remedy = "change a length or the position of a hinge slightly, so that they close "
+                remedy += "in other configurations too"
+            closing = _closing_elements_text(names[row][0] for row in sorted(rank.redundant_here))
             raise SceneError(
-                f"scene: {_closing_elements_text(names[row][0] for row in sorted(rank.here))} in "
-                f"a pose that no "
-                f"motion leaves, stretched out or folded in line; "
+                f"scene: {closing} in an isolated configuration, stretched out or folded in line; "
                 f"{find_skewed_axis(packed, MIN_COUNTING_ANGLE) or remedy}"
             )
-        imposed_rows = [row for row in range(calls.count) if not records.yields(row)]
-        independent_count = len(imposed_rows) - len(rank.here)
+        imposed_rows = [row for row in range(calls.count) if not records.is_rotor_row(row)]
+        independent_count = len(imposed_rows) - len(rank.redundant_here)
         couplings = {
-            record.coupling.name for record in records.couplings if record.row in rank.going
+            record.coupling.name for record in records.couplings if record.row in rank.removed_rows
         }
         removed_rows = {
             (record.frame, direction)
             for record in records.closures
-            for direction, row in record.rows.items() if row in rank.going
+            for direction, row in record.rows.items() if row in rank.removed_rows
         }  # fmt: skip
         chosen_counts = _independent_counts(records, rank)
         remaining_system = with_row_choice(
             without_rows(packed.system, removed_rows, couplings), chosen_counts
         )
-        mobility = free_speeds - self._shared() - independent_count
+        mobility = free_speeds - self._cut_hinge_speed_count() - independent_count
         modal_speed_count = sum(slots.nu for slots in packed.layout.modal.values())
         if packed.releases:
             # Rows redundant now may be needed after a release: decide at every evaluation.
-            for row in rank.going:
-                records.judge(row, REDUNDANT_PIVOT * float(calls.mobility[row]))
-        elif rank.always:
+            for row in rank.removed_rows:
+                records.set_pivot_floor(row, REDUNDANT_PIVOT * float(calls.mobility[row]))
+        elif rank.always_redundant:
             self.engine = LoopedEngine(packed_system(remaining_system, packed))
             calls = LoopCalls(self.engine, q)
             records = calls.records
         rounding_rows, redundant_names = (
-            calls.judge_by(rank.states),
-            {names[row] for row in rank.here},
+            calls.set_pivot_reference(rank.states),
+            {names[row] for row in rank.redundant_here},
         )
         packed = self.engine.packed
-        packed.model.loops_strain = _SINGULAR_STRAIN_RATIO * min(map(calls.strain, rank.states))
+        packed.model.loops_strain = _SINGULAR_STRAIN_RATIO * min(
+            map(calls.max_rounding_ratio, rank.states)
+        )
         rounding_names = [
             name for row, name in enumerate(self._names(calls)) if row in rounding_rows
         ]
-        self._refuse_drowned([name for name in rounding_names if name not in redundant_names])
+        self._check_rounding([name for name in rounding_names if name not in redundant_names])
         analysis = LoopAnalysis(
             tuple(cut.hinge for cut in packed.expanded.cuts if cut.constraint is None),
-            tuple(names), independent_count, len(imposed_rows) - rank.nearby,
-            tuple(names[row] for row in sorted(rank.here)),
-            tuple(names[row] for row in sorted(rank.here - rank.always)),
-            mobility, records.width, load_names, shapes=min(mobility, modal_speed_count),
+            tuple(names), independent_count, len(imposed_rows) - rank.min_redundant_count,
+            tuple(names[row] for row in sorted(rank.redundant_here)),
+            tuple(names[row] for row in sorted(rank.redundant_here - rank.always_redundant)),
+            mobility, records.width, load_names, flexible_mobility=min(mobility, modal_speed_count),
         )  # fmt: skip
-        return analysis, {row: names[row] for row in sorted(rank.always)}
+        return analysis, {row: names[row] for row in sorted(rank.always_redundant)}
 
-    def _too_many(self, q: Array, holds: Sequence[str], free_speeds: int) -> str:
+    def _excess_hold_text(self, q: Array, holds: Sequence[str], free_speeds: int) -> str:
         """Message part if `holds` fix more coordinates than the mobility near q, else ""."""
         count = sum(self.engine.packed.layout.hinges[name].nu for name in holds)
         try:
             near_q = Assembly(self.engine, q).positions(q)
-            self._keep(near_q)
-            mobility = self._judged(near_q, free_speeds)[0].mobility
+            self._fix_coupling_values(near_q)
+            mobility = self._analyse(near_q, free_speeds)[0].mobility
         except MstmmError:  # it does not close without fixed coordinates either
             return ""
         if count <= mobility:
             return ""
         freedom_text = "1 degree of freedom" if mobility == 1 else f"{mobility} degrees of freedom"
         return (
-            f"; hold keeps {count} coordinate{'s' * (count > 1)}, the mechanism has {freedom_text}"
+            f"; hold fixes {count} coordinate{'s' * (count > 1)}, the mechanism has {freedom_text}"
         )
 
-    def _refuse_structure(self) -> None:
+    def _check_mobility(self) -> None:
         """Raise SceneError if the mechanism has no mobility and no prescribed motion."""
-        if self.loops.mobility > 0 or self._is_led:
+        if self.loops.mobility > 0 or self._has_prescribed_motion:
             return
         remedy = find_skewed_axis(self.engine.packed, MIN_COUNTING_ANGLE)
         remedy = remedy or "use a hinge with more coordinates, or replace a hinge by a [[spring]]"
         raise SceneError(
-            f"scene: no degree of freedom is left, and "
-            f"{_closing_elements_text(name for name, _ in self.loops.rows)}: a structure; {remedy}"
+            "scene: no degrees of freedom (a structure), "
+            f"{_closing_elements_text(name for name, _ in self.loops.constraint_rows)}; {remedy}"
         )
 
-    def _refuse_drowned(self, rows: Sequence[tuple[str, str]]) -> None:
+    def _check_rounding(self, rows: Sequence[tuple[str, str]]) -> None:
         """Raise NumericalFailure for independent rows lost to rounding because of the masses."""
         if rows:
             name, direction = rows[0]
@@ -385,24 +391,26 @@ class LoopStart:
             )
 
     @property
-    def _is_led(self) -> bool:
+    def _has_prescribed_motion(self) -> bool:
         """True if drives, time-dependent couplings or releases may move the mechanism."""
         packed = self.engine.packed
-        is_driven = any(coupling.goes_by_time for coupling in packed.described.coupling)
+        is_driven = any(coupling.is_time_dependent for coupling in packed.user_scene.coupling)
         return is_driven or bool(packed.system.driven or packed.releases)
 
-    def _refuse_locked(
+    def _check_redundancy_gaps(
         self, calls: LoopCalls, repeating: Mapping[int, tuple[str, str]], much: float
     ) -> None:
         """Raise SceneError if a redundant row has a gap that the other rows do not close."""
         q, u = self.start
-        gaps = np.abs(calls.correction(calls.gap, q, np.zeros(len(u)))[1])
-        velocity_errors = np.abs(calls.correction(calls.slip, q, u)[1])
+        gaps = np.abs(calls.correction(calls.position_level, q, np.zeros(len(u)))[1])
+        velocity_errors = np.abs(calls.correction(calls.velocity_level, q, u)[1])
         coupling_rows = [coupling.row for coupling in calls.records.couplings]
         gaps[coupling_rows] = np.maximum(gaps, velocity_errors)[coupling_rows]
         worst_row = max(repeating, key=lambda row: float(gaps[row]), default=None)
         if worst_row is not None and gaps[worst_row] > much * NEGLIGIBLE_MISFIT:
-            self.loops = replace(self.loops, misfit=(float(gaps[worst_row]), *repeating[worst_row]))
+            self.loops = replace(
+                self.loops, redundancy_gap=(float(gaps[worst_row]), *repeating[worst_row])
+            )
         for row, (closing, direction) in repeating.items():
             if gaps[row] > much:
                 if direction in _COUPLING_ROWS:
@@ -411,18 +419,20 @@ class LoopStart:
                         f"{gaps[row]:.3g} at the start; omit it, or correct its expression"
                     )
                 raise SceneError(
-                    f"scene: direction {direction} of {calls.closing(row)} is redundant, violated "
-                    f"by {gaps[row]:.3g}: "
-                    f"{self._sharing(q) or self._locking(float(gaps[row]))}"
+                    f"scene: direction {direction} of {calls.closing_label(row)} is redundant, "
+                    f"violated by {gaps[row]:.3g}: "
+                    f"{self._shared_drives_note(q) or self._locking_gap_text(float(gaps[row]))}"
                 )
 
-    def _locking(self, gap: float) -> str:
+    def _locking_gap_text(self, gap: float) -> str:
         """Message part about a gap (m, rad) that no motion closes, with a remedy."""
         remedy = find_skewed_axis_by_gap(self.engine.packed, gap)
-        remedy = remedy or "make axes parallel and points meet, or use a ball or cylindrical hinge"
+        remedy = (
+            remedy or "make axes parallel and points coincide, or use a ball or cylindrical hinge"
+        )
         return f"as a rigid mechanism it would lock; {remedy}"
 
-    def _shared(self) -> int:
+    def _cut_hinge_speed_count(self) -> int:
         """Number of free speeds of cut hinges, already counted in the tree."""
         system = self.engine.packed.system
         frames = [system.body(closure.frame) for closure in system.closures]
@@ -440,7 +450,7 @@ class LoopStart:
             speeds = system.body(closure.frame).nu
             constrained_directions = [direction for direction in range(6) if direction >= speeds]
             axes = outboard_axes(calls, closure.frame)
-            W = calls.numbers_of(closure, "W")[constrained_directions].reshape(-1, 2, 3) @ axes
+            W = calls.closure_matrix(closure, "W")[constrained_directions].reshape(-1, 2, 3) @ axes
             direction_names = dict(
                 zip(
                     constrained_directions,
@@ -460,9 +470,9 @@ class LoopStart:
 def _independent_counts(records: LoopRecords, rank: Rank) -> dict[int, int]:
     """Number of independent rows of closures with interchangeable rows, by frame index."""
     rows_by_frame = {closure.frame: {*closure.rows.values()} for closure in records.closures}
-    interchangeable_rows = rank.always - rank.going
+    interchangeable_rows = rank.always_redundant - rank.removed_rows
     return {
-        frame: len(rows - rank.always) - sum(map(records.yields, rows))
+        frame: len(rows - rank.always_redundant) - sum(map(records.is_rotor_row, rows))
         for frame, rows in rows_by_frame.items() if rows & interchangeable_rows
     }  # fmt: skip
 

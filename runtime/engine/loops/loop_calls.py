@@ -40,18 +40,18 @@ class LoopCalls(LoopWorkspace):
         quaternions = np.append(engine.packed.layout.quaternions, 0).astype(np.int32)
         self._quaternions = quaternions
         self.mobility = np.ones(self.count)
-        self.correction(self.gap, q, np.zeros(engine.nu))
+        self.correction(self.position_level, q, np.zeros(engine.nu))
         self.mobility = row_mobilities(self) if mobility is None else mobility
         for row, scale in enumerate(self.mobility.tolist()):
             records.scale(row, scale)
-            records.judge(row, records.floor(row) or PIVOT_ROUNDING * scale)
+            records.set_pivot_floor(row, records.floor(row) or PIVOT_ROUNDING * scale)
 
     @property
-    def gap(self) -> int:
+    def position_level(self) -> int:
         return int(self.engine.lib.MSTMM_GAP)
 
     @property
-    def slip(self) -> int:
+    def velocity_level(self) -> int:
         return int(self.engine.lib.MSTMM_SLIP)
 
     def correction(
@@ -66,7 +66,7 @@ class LoopCalls(LoopWorkspace):
             engine.pointer(self.memory), engine.pointer(change), engine.pointer(errors), failure,
         )  # fmt: skip
         if code:
-            raise engine.failed(failure, t, q, u)
+            raise engine.evaluation_error(failure, t, q, u)
         return change, errors[: self.count]
 
     def choose(self, q: Array) -> bool:
@@ -81,31 +81,35 @@ class LoopCalls(LoopWorkspace):
             is_changed, failure,
         )  # fmt: skip
         if code:
-            raise engine.failed(failure, self.t, q, np.zeros(engine.nu))
+            raise engine.evaluation_error(failure, self.t, q, np.zeros(engine.nu))
         return bool(is_changed[0])
 
-    def resting(self) -> NDArray[np.bool_]:
+    def inactive_rows(self) -> NDArray[np.bool_]:
         """Mask (rows,) of rows that are not chosen: interchangeable ones are used instead."""
-        return self.records.resting(self.memory)
+        return self.records.inactive_rows(self.memory)
 
-    def let_go(self) -> list[int]:
+    def released_rows(self) -> list[int]:
         """Rows of hinges that are released according to `memory`."""
         releases = (int(self.model.rows[row].release) for row in range(self.count))
-        return [row for row, place in enumerate(releases) if place >= 0 and self.memory[place]]
+        return [
+            row
+            for row, memory_index in enumerate(releases)
+            if memory_index >= 0 and self.memory[memory_index]
+        ]
 
-    def stressed(self, q: Array, asked: Array, give: float) -> Array:
-        """Multipliers (rows,) of rows with errors `asked` and compliance `give`; see sweep.h."""
+    def solve_multipliers(self, q: Array, errors: Array, give: float) -> Array:
+        """Multipliers (rows,) of rows with errors `errors` and compliance `give`; see sweep.h."""
         engine, multipliers = self.engine, np.zeros(max(1, self.count))
         failure = engine.ffi.new("mstmm_failure *")
         code = engine.lib.mstmm_stressed(
-            self.model, engine.workspace(), give, engine.pointer(asked), engine.pointer(q),
+            self.model, engine.workspace(), give, engine.pointer(errors), engine.pointer(q),
             engine.pointer(self.memory), engine.pointer(multipliers), failure,
         )  # fmt: skip
         if code:
-            raise engine.failed(failure, 0.0, q, np.zeros(engine.nu))
+            raise engine.evaluation_error(failure, 0.0, q, np.zeros(engine.nu))
         return multipliers[: self.count]
 
-    def moved(self, q: Array, change: Array) -> Array:
+    def move(self, q: Array, change: Array) -> Array:
         """Move q (nq,) by a change along the speeds (nu,)."""
         engine, q_moved, t = self.engine, q.copy(), self.t
         failure = engine.ffi.new("mstmm_failure *")
@@ -115,7 +119,7 @@ class LoopCalls(LoopWorkspace):
             engine.ffi.from_buffer("int[]", self._quaternions), failure,
         )  # fmt: skip
         if code:
-            raise engine.failed(failure, t, q, change)
+            raise engine.evaluation_error(failure, t, q, change)
         return q_moved
 
     def driven(self, q: Array, u: Array) -> tuple[Array, Array]:
@@ -127,10 +131,10 @@ class LoopCalls(LoopWorkspace):
             engine.pointer(self.memory), failure,
         )  # fmt: skip
         if code:
-            raise engine.failed(failure, t, q, u)
+            raise engine.evaluation_error(failure, t, q, u)
         return q, u
 
-    def judge_by(self, states: Sequence[Array]) -> set[int]:
+    def set_pivot_reference(self, states: Sequence[Array]) -> set[int]:
         """Set the reference for pivots far below their mobilities from closed states (nq,).
 
         Such rows are independent, with heavy bodies outboard of them; their reference is the
@@ -139,22 +143,24 @@ class LoopCalls(LoopWorkspace):
         """
         floors = [self.records.floor(row) for row in range(self.count)]
         for row in range(self.count):
-            self.records.judge(row, _MIN_REFERENCE * float(self.mobility[row]))
+            self.records.set_pivot_floor(row, _MIN_REFERENCE * float(self.mobility[row]))
         reference_pivots = np.zeros(self.count)
         for q in states:
-            self.correction(self.slip, q, np.zeros(self.engine.nu))
+            self.correction(self.velocity_level, q, np.zeros(self.engine.nu))
             reference_pivots = np.maximum(
                 reference_pivots, np.where(self.inverses() > 0, self.pivots(), 0.0)
             )
         for row, (pivot, mobility) in enumerate(zip(reference_pivots, self.mobility, strict=True)):
-            is_heavy = 0.0 < pivot < _HEAVY_BODY_RATIO * mobility and not self.records.yields(row)
+            is_heavy = 0.0 < pivot < _HEAVY_BODY_RATIO * mobility and not self.records.is_rotor_row(
+                row
+            )
             floor = max(PIVOT_ROUNDING * pivot, _MIN_PIVOT * mobility) if is_heavy else floors[row]
-            self.records.judge(row, min(floor, floors[row]))
+            self.records.set_pivot_floor(row, min(floor, floors[row]))
         return {row for row in range(self.count) if not reference_pivots[row]} - {
-            *self.records.chosen
+            *self.records.optional_rows
         }
 
-    def strain(self, q: Array) -> float:
+    def max_rounding_ratio(self, q: Array) -> float:
         """Largest ratio of rounding level to pivot over all rows, at a closed state."""
-        self.correction(self.slip, q, np.zeros(self.engine.nu))
+        self.correction(self.velocity_level, q, np.zeros(self.engine.nu))
         return float((self.inverses() * self.records.floors).max(initial=0.0))

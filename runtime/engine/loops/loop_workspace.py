@@ -18,14 +18,14 @@ class LoopWorkspace:
         self.engine, self.records = engine, records
         self.count = records.count
 
-    def closing(self, row: int) -> str:
+    def closing_label(self, row: int) -> str:
         """Label of the element to which a row belongs, for messages."""
         for closure in self.records.closures:
             if row in closure.rows.values():
-                return self.engine.closing(closure.frame)
-        return f'coupling "{self.coupling_of(row)}"'
+                return self.engine.closing_label(closure.frame)
+        return f'coupling "{self.coupling_name(row)}"'
 
-    def coupling_of(self, row: int) -> str:
+    def coupling_name(self, row: int) -> str:
         """Name of the coupling to which a row belongs, or ""."""
         names = (
             coupling.coupling.name for coupling in self.records.couplings if coupling.row == row
@@ -34,35 +34,35 @@ class LoopWorkspace:
 
     def inverses(self) -> Array:
         """Inverse pivots of the rows in the last correction, 0 for rows without a multiplier."""
-        return self._of_rows("INVERSE")
+        return self._row_values("INVERSE")
 
     def pivots(self) -> Array:
         """Pivots of the rows in the last correction."""
-        return self._of_rows("PIVOT")
+        return self._row_values("PIVOT")
 
-    def _of_rows(self, name: str) -> Array:
+    def _row_values(self, name: str) -> Array:
         lib, stride = self.engine.lib, int(self.engine.lib.MSTMM_ROW)
-        first = self.records.place + int(getattr(lib, f"MSTMM_ROW_{name}"))
+        first = self.records.offset + int(getattr(lib, f"MSTMM_ROW_{name}"))
         return self.engine.workspace_array()[first : first + stride * self.count : stride].copy()
 
     def values(self) -> Array:
         """Values of the couplings in the last gap correction."""
-        first = self.records.place + int(self.engine.lib.MSTMM_COUPLING_GAP)
+        first = self.records.offset + int(self.engine.lib.MSTMM_COUPLING_GAP)
         indices = [first + coupling.numbers for coupling in self.records.couplings]
         return self.engine.workspace_array()[indices]
 
-    def slopes_of(self, one: WrittenCoupling, place: int) -> Array:
+    def coupling_derivatives(self, coupling: WrittenCoupling, tree_index: int) -> Array:
         """Derivatives -C (nu,) of a coupling with respect to the speeds of one of its hinges.
 
         Valid after a correction.
         """
-        start = self.records.place + one.columns[place]
+        start = self.records.offset + coupling.columns[tree_index]
         return self.engine.workspace_array()[
-            start : start + self.engine.packed.system.body(place).nu
+            start : start + self.engine.packed.system.body(tree_index).nu
         ]
 
-    def numbers_of(self, one: WrittenClosure, name: str) -> Array:
+    def closure_matrix(self, closure: WrittenClosure, name: str) -> Array:
         """Matrix (6, 6) of a closure after a correction: W, J_A or J_B."""
-        start = self.records.place + one.numbers
+        start = self.records.offset + closure.numbers
         start += int(getattr(self.engine.lib, f"MSTMM_CLOSURE_{name}"))
         return self.engine.workspace_array()[start : start + 36].reshape(6, 6).copy()

@@ -58,7 +58,7 @@ def find_skewed_axis(packed: PackedScene, least: float) -> str:
 
     Its angle is between `least` and 0.1 rad; empty if there is no such axis.
     """
-    scene, worst_skews = packed.described.skeleton, list[_Skew]()
+    scene, worst_skews = packed.user_scene.skeleton, list[_Skew]()
     plan = build_topology(scene).plan
     for cut in plan.cut if plan is not None else ():
         assert plan is not None
@@ -146,9 +146,12 @@ def _end_rotation(scene: SceneTables, reference: str) -> Array:
     return np.eye(3) if index is None else np.array(scene.bodies[index].end_rotation(end_name))
 
 
-def _line_angle(one: Array, other: Array) -> float:
+def _line_angle(first_axis: Array, second_axis: Array) -> float:
     """Angle (rad) between two lines."""
-    return math.atan2(float(np.linalg.norm(np.cross(one, other))), abs(float(one @ other)))
+    return math.atan2(
+        float(np.linalg.norm(np.cross(first_axis, second_axis))),
+        abs(float(first_axis @ second_axis)),
+    )
 
 
 # --- messages -------------------------------------------------------------------------------------

@@ -58,18 +58,19 @@ def _driven_speeds_in_motions(engine: LoopedEngine, q: Array) -> Array:
     closed_q = Assembly(undriven_engine, q).positions(q)
     calls = geometric_loop_calls(undriven_engine, closed_q)
     for row, mobility in enumerate(calls.mobility.tolist()):
-        calls.records.judge(row, REDUNDANT_PIVOT * mobility)
-    places = [
-        packed.layout.hinges[engine.hinge_name(place)].u + k for place, k in packed.system.driven
+        calls.records.set_pivot_floor(row, REDUNDANT_PIVOT * mobility)
+    driven_speeds = [
+        packed.layout.hinges[engine.hinge_name(tree_index)].u + k
+        for tree_index, k in packed.system.driven
     ]
-    count = len(places) + _EXTRA_TRIALS
+    count = len(driven_speeds) + _EXTRA_TRIALS
     trials = np.random.default_rng(0).standard_normal((count, engine.nu))
-    rest_correction = calls.correction(calls.slip, closed_q, np.zeros(engine.nu))[0]
+    rest_correction = calls.correction(calls.velocity_level, closed_q, np.zeros(engine.nu))[0]
     motions = [
-        trial + calls.correction(calls.slip, closed_q, trial)[0] - rest_correction
+        trial + calls.correction(calls.velocity_level, closed_q, trial)[0] - rest_correction
         for trial in trials
     ]
-    return np.array(motions)[:, places].T
+    return np.array(motions)[:, driven_speeds].T
 
 
 def _redundant_drives_text(names: list[str], drives: int, surplus: int) -> str:

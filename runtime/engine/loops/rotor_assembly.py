@@ -52,7 +52,7 @@ class RotorAssembly(Assembly):
     def _shaken(self, q: Array) -> Array:
         """Perturb q: with all links in line the direction of bending is undetermined."""
         change = _RANDOM_CHANGE * np.random.default_rng(0).uniform(-1.0, 1.0, self._engine.nu)
-        return self.calls.moved(q, change * self.free)
+        return self.calls.move(q, change * self.free_speed_mask)
 
     def _with_rotors(self) -> LoopedEngine:
         """Engine with a rotor on each hinge: total mass times mean hinge distance squared."""
@@ -64,5 +64,5 @@ class RotorAssembly(Assembly):
             with_rotors(system, np.full(self._engine.nu, inertia).tolist()), packed
         )
         assert loop_records is not None and packed_with_rotors.written.loops is not None
-        packed_with_rotors.written.loops.judge_as(loop_records)
+        packed_with_rotors.written.loops.copy_pivot_floors(loop_records)
         return LoopedEngine(packed_with_rotors)

@@ -43,7 +43,7 @@ def find_indeterminate_loads(
 
     `calls` are those of a geometry in which all rows are satisfied.
     """
-    gaps = np.abs(calls.correction(calls.gap, q, np.zeros(calls.engine.nu))[1])
+    gaps = np.abs(calls.correction(calls.position_level, q, np.zeros(calls.engine.nu))[1])
     rounding = max(_RELATIVE_ROUNDING, _GAP_FACTOR * float(gaps.max(initial=0.0)))
     random_marks = [
         _loaded_components(calls, q, silent, seed, rounding) for seed in range(_RANDOM_STATES)
@@ -51,7 +51,7 @@ def find_indeterminate_loads(
     is_loaded, is_row_loaded = (np.any(marks, axis=0) for marks in zip(*random_marks, strict=True))
     packed, components_by_hinge = calls.engine.packed, dict[str, tuple[str, ...]]()
     for number, hinge in enumerate(packed.scene.hinges):
-        marks = is_loaded[packed.topology.place_of_hinge(number)]
+        marks = is_loaded[packed.topology.position_of_hinge(number)]
         components = tuple(
             component for component, mark in zip(_COMPONENTS, marks, strict=True) if mark
         )
@@ -62,10 +62,10 @@ def find_indeterminate_loads(
     )
 
 
-def outboard_axes(calls: LoopCalls, place: int) -> Array:
+def outboard_axes(calls: LoopCalls, tree_index: int) -> Array:
     """Outboard axes (3, 3) of the hinge at a tree index, in internal axes of its body."""
     packed = calls.engine.packed
-    hinge = packed.scene.hinges[packed.topology.at(place)[1]]
+    hinge = packed.scene.hinges[packed.topology.scene_indices(tree_index)[1]]
     return np.reshape(packed.end(hinge.outboard)[1], (3, 3))
 
 
@@ -74,15 +74,15 @@ def _loaded_components(
 ) -> tuple[Array, Array]:
     """Masks of components (bodies, 6) and rows (rows,) loaded by a random self-stress state."""
     for row in range(calls.count):
-        calls.records.judge(row, np.inf if row in silent else 0.0)
+        calls.records.set_pivot_floor(row, np.inf if row in silent else 0.0)
     is_imposed = np.array(
-        [row not in silent and not calls.records.yields(row) for row in range(calls.count)]
+        [row not in silent and not calls.records.is_rotor_row(row) for row in range(calls.count)]
     )
     multipliers = (
         is_imposed * np.random.default_rng(seed).normal(size=calls.count) / np.sqrt(calls.mobility)
     )
     for _ in range(_REPETITIONS):
-        multipliers = is_imposed * calls.stressed(
+        multipliers = is_imposed * calls.solve_multipliers(
             q, _COMPLIANCE * calls.mobility * multipliers, _COMPLIANCE
         )
     return tuple(
@@ -95,17 +95,17 @@ def _load_sizes(calls: LoopCalls) -> Array:
     """Magnitudes of the load components (bodies, 6) of inboard hinges, in outboard axes."""
     packed = calls.engine.packed
     sizes = np.zeros((packed.system.count, 6))
-    for place in range(len(sizes)):
-        load = _load_at_origin(calls, place)
-        load[3:] += np.cross([0.0, 0.0, packed.system.body(place).height], load[:3])
-        axes = outboard_axes(calls, place)
-        sizes[place] = np.abs(np.concatenate([axes.T @ load[:3], axes.T @ load[3:]]))
+    for tree_index in range(len(sizes)):
+        load = _load_at_origin(calls, tree_index)
+        load[3:] += np.cross([0.0, 0.0, packed.system.body(tree_index).height], load[:3])
+        axes = outboard_axes(calls, tree_index)
+        sizes[tree_index] = np.abs(np.concatenate([axes.T @ load[:3], axes.T @ load[3:]]))
     return sizes
 
 
-def _load_at_origin(calls: LoopCalls, place: int) -> Array:
+def _load_at_origin(calls: LoopCalls, tree_index: int) -> Array:
     """Load f = S delta + e (6,) of a body from the last call, about its internal origin."""
-    lib, first = calls.engine.lib, int(calls.engine.packed.written.blocks[place])
+    lib, first = calls.engine.lib, int(calls.engine.packed.written.blocks[tree_index])
     block = calls.engine.workspace_array()[first:]
     S = np.zeros((6, 6))
     S[_UPPER_TRIANGLE] = block[lib.MSTMM_BLOCK_S : lib.MSTMM_BLOCK_S + 21]

@@ -58,17 +58,17 @@ class Kinematics:
         self, engine: LoopedEngine, fusion: FusedCode, references: BodyReferences,
         brackets: Callable[[], Brackets | None],
     ) -> None:  # fmt: skip
-        self._engine, self._fusion, self._references = engine.inertia_alone, fusion, references
-        self._brackets, self._bends = brackets, bool(engine.packed.layout.modal)
-        self._known = dict[Names, list[Probe]]()
+        self._engine, self._fusion, self._references = engine.inertia_only, fusion, references
+        self._brackets, self._has_modes = brackets, bool(engine.packed.layout.modal)
+        self._probes_by_names = dict[Names, list[Probe]]()
         self._records = dict[Names, tuple[Any, int]]()
         self._calls = dict[tuple[str, Names], PreparedCall]()
         #: Number of requests of bodies or ends without code of the scene.
-        self._asked = dict[Names, int]()
+        self._request_counts = dict[Names, int]()
         self._local = threading.local()
         self._numbers = int(engine.lib.MSTMM_PROBE_NUMBERS)
 
-    def call(self, kind: str, of: Names) -> PreparedCall:
+    def prepared_call(self, kind: str, of: Names) -> PreparedCall:
         """Prepared call on one state, q (nq,) or q and u (nu,), for bodies or ends.
 
         `kind` is "places", "poses", "velocities", "jacobian" or "jacobian_rate".
@@ -81,17 +81,19 @@ class Kinematics:
         if call is None:
             key = of if isinstance(of, str) else require_texts("of", of, "rod1.tip")
             call = self._calls.get((kind, key))
-        if call is None or key in self._asked:
+        if call is None or key in self._request_counts:
             call = self._sought(kind, key)
         return call
 
     def _sought(self, kind: str, key: Names) -> PreparedCall:
         """Prepared call; calls number 1, 2, 4, 8, ... search for code first."""
-        request_count = self._asked[key] = self._asked.get(key, 0) + 1
+        request_count = self._request_counts[key] = self._request_counts.get(key, 0) + 1
         call = self._calls.get((kind, key))
         if call is None or request_count & (request_count - 1) == 0:
             bodies = [probe.body for probe in self._probes_of(key)]
-            needs_loops = self._bends or min(bodies, default=-1) < 0 or bool(self._fusion.obstacle)
+            needs_loops = (
+                self._has_modes or min(bodies, default=-1) < 0 or bool(self._fusion.obstacle)
+            )
             codes = (
                 []
                 if needs_loops
@@ -103,37 +105,41 @@ class Kinematics:
                 for other_kind in _CALL_SHAPES:
                     self._calls.pop((other_kind, key), None)
             if is_complete or needs_loops:
-                self._asked.pop(key, None)
-            call = self._calls[kind, key] = self._prepared(
+                self._request_counts.pop(key, None)
+            call = self._calls[kind, key] = self._prepare(
                 kind, key, available if is_complete else None
             )
         return call
 
-    def each(self, kind: str, of: Names, general: Callable[..., Array], *states: Array) -> Array:
+    def evaluate_rows(
+        self, kind: str, of: Names, general: Callable[..., Array], *states: Array
+    ) -> Array:
         """Evaluate "jacobian" or "jacobian_rate" (n, k, 6, nu) at rows of states.
 
         The prepared call is used, or `general(of, row, ...)` where it returns None.
         """
-        call, count = self.call(kind, of), self._probes(of)[1]
+        call, count = self.prepared_call(kind, of), self._probes(of)[1]
         rows = np.empty((len(states[0]), count, 6, self._engine.nu))
         for row, state in zip(rows, zip(*states, strict=True), strict=True):
             result = call(*state)
             row[:] = general(of, *state) if result is None else result
         return rows
 
-    def _prepared(self, kind: str, of: Names, codes: list[FusedLibrary] | None) -> PreparedCall:
+    def _prepare(self, kind: str, of: Names, codes: list[FusedLibrary] | None) -> PreparedCall:
         engine, (probes, count) = self._engine, self._probes(of)
         if codes is not None:
             fused_record = _FusedPointsRecord(engine, self._fusion, self._probes_of(of), codes)
-            return self._of_record(kind, of, "compiled_points", fused_record)
+            return self._prepare_record_call(kind, of, "compiled_points", fused_record)
         needs_jacobian = kind.startswith("jacobian")
-        brackets = self._brackets() if kind == "jacobian_rate" and not self._bends else []
-        if brackets is None or not is_small(engine) or (needs_jacobian and self._bends):
+        brackets = self._brackets() if kind == "jacobian_rate" and not self._has_modes else []
+        if brackets is None or not is_small(engine) or (needs_jacobian and self._has_modes):
             return unavailable_call
-        record = _LoopedPointsRecord(engine, self._room, probes, count, brackets)
-        return self._of_record(kind, of, "points", record)
+        record = _LoopedPointsRecord(engine, self._workspace, probes, count, brackets)
+        return self._prepare_record_call(kind, of, "points", record)
 
-    def _of_record(self, kind: str, of: Names, functions: str, record: Any) -> PreparedCall:
+    def _prepare_record_call(
+        self, kind: str, of: Names, functions: str, record: Any
+    ) -> PreparedCall:
         nq, nu = self._engine.nq, self._engine.nu
         needs_speeds, shape = _CALL_SHAPES[kind]
         point_axis = () if isinstance(of, str) else (len(of),)
@@ -143,7 +149,7 @@ class Kinematics:
         )  # fmt: skip
 
     @cached_property
-    def _room(self) -> Any:
+    def _workspace(self) -> Any:
         """Workspace shared by all prepared calls, of which only one runs at a time."""
         return self._engine.pointer(np.zeros(self._engine.packed.workspace))
 
@@ -157,19 +163,19 @@ class Kinematics:
         )
         return points_found
 
-    def still(self, of: Names, q: Array) -> Array:
+    def points_at_rest(self, of: Names, q: Array) -> Array:
         """Result of `points` for n states at rest."""
         zeros = np.zeros((len(q), self._engine.nu))
         return self.points(of, q, zeros, zeros)
 
-    def moving(self, of: Names, q: Array, u: Array) -> Array:
+    def velocities(self, of: Names, q: Array, u: Array) -> Array:
         """Velocity and angular velocity (n, k, 6) in inertial axes."""
         return self.points(of, q, u, np.zeros(u.shape))[..., _VELOCITY_COLUMNS]
 
     def jacobian(self, of: Names, q: Array) -> Array:
-        """Jacobian (k, 6, nu) at one state: derivative of `moving` with respect to speeds."""
-        if self._bends:
-            return self._by_units(of, q)
+        """Jacobian (k, 6, nu) at one state: derivative of `velocities` with respect to speeds."""
+        if self._has_modes:
+            return self._jacobian_by_unit_speeds(of, q)
         probes, count = self._probes(of)
         jacobian_matrix = np.empty((count, 6, self._engine.nu))
         self._run(
@@ -181,7 +187,7 @@ class Kinematics:
         )
         return jacobian_matrix
 
-    def _by_units(self, of: Names, q: Array) -> Array:
+    def _jacobian_by_unit_speeds(self, of: Names, q: Array) -> Array:
         """Jacobian (k, 6, nu) from unit speeds, including modal rates."""
         nu = self._engine.nu
         q_rows, units = np.tile(q, (nu, 1)), np.eye(nu)
@@ -220,22 +226,22 @@ class Kinematics:
 
     def _probes_of(self, of: Names) -> list[Probe]:
         key = of if isinstance(of, str) else require_texts("of", of, "rod1.tip")
-        probes = self._known.get(key)
+        probes = self._probes_by_names.get(key)
         if probes is None:
             names = [key] if isinstance(key, str) else key
-            canonical_names = map(self._references.place, names)
-            probes = self._known[key] = [
+            canonical_names = map(self._references.canonical_name, names)
+            probes = self._probes_by_names[key] = [
                 Probe(*self._engine.packed.end(name_of_end)) for name_of_end in canonical_names
             ]
         return probes
 
     def _run(self, function: str, *given: Any) -> None:
-        record = self._made()
+        record = self._thread_record()
         c_function = getattr(self._engine.lib, f"mstmm_{function}")
         if c_function(record.record, *given, record.failure):
             raise NumericalFailure(self._engine.failure_text(record.failure, 0.0))
 
-    def _made(self) -> _KinematicsRecord:
+    def _thread_record(self) -> _KinematicsRecord:
         """Record of this thread."""
         record: _KinematicsRecord | None = getattr(self._local, "made", None)
         if record is None:
@@ -246,12 +252,12 @@ class Kinematics:
 class _KinematicsRecord:
     """C record for the general calls of one thread."""
 
-    __slots__ = ("_pointed", "failure", "record")
+    __slots__ = ("_references", "failure", "record")
 
     def __init__(self, engine: LoopedEngine) -> None:
         self.record = engine.ffi.new("mstmm_kinematics *")
         self.failure = engine.ffi.new("mstmm_failure *")
-        self._pointed = _fill_record(self.record, engine, engine.workspace())
+        self._references = _fill_record(self.record, engine, engine.workspace())
 
 
 class _FusedPointsRecord:
@@ -273,7 +279,7 @@ class _FusedPointsRecord:
         libraries = ffi.new("mstmm_fused *[]", [ffi.cast("mstmm_fused *", library.descriptor)
                                                 for library in codes])  # fmt: skip
         record.n_probes, record.codes = len(codes), libraries
-        self._pointed = *pointers, libraries, codes
+        self._references = *pointers, libraries, codes
 
 
 class _LoopedPointsRecord:
@@ -290,7 +296,7 @@ class _LoopedPointsRecord:
         bracket_records = engine.ffi.new("mstmm_bracket[]", brackets)
         record.n_probes, record.probes, record.way = count, probes, path
         record.n_brackets, record.brackets = len(brackets), bracket_records
-        self._pointed = (
+        self._references = (
             *pointers,
             probes,
             path,

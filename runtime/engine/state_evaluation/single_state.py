@@ -54,7 +54,7 @@ class SingleStateCalls:
     def __init__(self, engine: LoopedEngine, fusion: FusedCode) -> None:
         self._engine, self._fusion = engine, fusion
         self._local = threading.local()
-        self._asked = 0
+        self._request_count = 0
         self.renew()
 
     def renew(self) -> None:
@@ -62,28 +62,30 @@ class SingleStateCalls:
         libraries = self._fusion.library, self._fusion.inverse
         record = _Record(self._engine, self._fusion, libraries) if is_small(self._engine) else None
         for name in _CALL_NAMES:
-            setattr(self, name, self._of_thread(name) if record is None else getattr(record, name))
+            setattr(
+                self, name, self._thread_call(name) if record is None else getattr(record, name)
+            )
         self.library, self.inverse = libraries
 
     def seek(self) -> None:
         """Search for code of inverse dynamics at calls number 1, 2, 4, 8, ..."""
         fusion = self._fusion
         if fusion.inverse is None:
-            self._asked += 1
-            if self._asked & (self._asked - 1) == 0:
-                fusion.ready_inverse(self._asked)
+            self._request_count += 1
+            if self._request_count & (self._request_count - 1) == 0:
+                fusion.ready_inverse(self._request_count)
         if self.inverse is not fusion.inverse:
             self.renew()
 
-    def _of_thread(self, name: str) -> PreparedCall:
+    def _thread_call(self, name: str) -> PreparedCall:
         """Call that uses the record of the current thread."""
 
         def call(*given: Any) -> Any:
-            return getattr(self._made(), name)(*given)
+            return getattr(self._thread_record(), name)(*given)
 
         return call
 
-    def _made(self) -> _Record:
+    def _thread_record(self) -> _Record:
         """Record of this thread, recreated when there is new fused code."""
         libraries = self.library, self.inverse
         record: _Record | None = getattr(self._local, "made", None)
@@ -104,12 +106,12 @@ class _Record:
         self._ffi, self.by = engine.ffi, by
         ffi = engine.ffi
         self._record = record = ffi.new("mstmm_alone *")
-        record.model, record.inertia = engine.packed.model, engine.inertia_alone.packed.model
+        record.model, record.inertia = engine.packed.model, engine.inertia_only.packed.model
         is_fused = any(library is not None for library in self.by)
         p = np.array(fusion.numbers) if is_fused else np.zeros(0)
         arrays = p, engine.start_memory(), np.zeros(nu), np.empty(nq), np.empty(2 * nu)
-        self._pointed: list[Any] = [engine.pointer(array) for array in arrays]
-        record.p, record.memory, record.none, record.qdot, record.work = self._pointed
+        self._references: list[Any] = [engine.pointer(array) for array in arrays]
+        record.p, record.memory, record.none, record.qdot, record.work = self._references
         if released:
             record.workspace = engine.workspace()
         else:  # other calls use the workspace of the thread
@@ -134,7 +136,7 @@ class _Record:
         ) -> PreparedCall:
             return prepare_call(
                 f"mstmm_alone_{name}", self._record, widths, shape, released=released,
-                kept=(engine, self.by, self._pointed), **how,
+                kept=(engine, self.by, self._references), **how,
             )  # fmt: skip
 
         self.accelerations = call(
@@ -149,13 +151,13 @@ class _Record:
 
     def _point(self, name: str, kind: str, array: NDArray[Any]) -> None:
         pointer = self._ffi.from_buffer(kind, array)
-        self._pointed.append(pointer)
+        self._references.append(pointer)
         setattr(self._record, name, pointer)
 
     def _follow(self, engine: LoopedEngine, live: LiveInputs) -> None:
         if live.varies:
-            places: NDArray[np.int32] = live.places
+            indices: NDArray[np.int32] = live.indices
             live_record = self._record.live
-            live_record.n, live_record.inputs = len(places), engine.packed.model.inputs
-            live_record.places = place_pointer = engine.ffi.from_buffer("int[]", places)
-            self._pointed.append(place_pointer)
+            live_record.n, live_record.inputs = len(indices), engine.packed.model.inputs
+            live_record.places = place_pointer = engine.ffi.from_buffer("int[]", indices)
+            self._references.append(place_pointer)

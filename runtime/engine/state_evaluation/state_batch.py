@@ -30,10 +30,10 @@ _MIN_WORK_LANES, _MIN_WORK_LOOPED = 20000, 2000
 class StateBatch:
     """Batch of n states: t (n,), q (n, nq), u (n, nu), extra efforts (n, nu) or None.
 
-    `lead` is the shape of the leading axes of the caller's arrays, () for one state.
+    `leading_shape` is the shape of the leading axes of the caller's arrays, () for one state.
     """
 
-    lead: tuple[int, ...]
+    leading_shape: tuple[int, ...]
     t: Array
     q: Array
     u: Array
@@ -66,11 +66,11 @@ def accelerations(
     """
     n, udot = len(states.q), np.empty((len(states.q), engine.nu))
     live = LiveInputs(engine.packed.system, fusing.inputs)
-    if not states.lead and fusing.library is not None:
-        numbers = live.at(fusing.numbers, states.t).ravel()
+    if not states.leading_shape and fusing.library is not None:
+        numbers = live.numbers_at(fusing.numbers, states.t).ravel()
         first_failure = _evaluate_single(engine, fusing.library, numbers, states, udot)
     else:
-        lanes = fusing.ready_lanes(n) if states.lead and n else None
+        lanes = fusing.ready_lanes(n) if states.leading_shape and n else None
         if lanes is None:
             evaluate_range, step, min_work = (
                 _looped_evaluation(engine, states, udot),
@@ -79,7 +79,7 @@ def accelerations(
             )
         else:
             evaluate_range = _lane_evaluation(
-                engine, lanes, live.at(fusing.numbers, states.t), states, udot
+                engine, lanes, live.numbers_at(fusing.numbers, states.t), states, udot
             )
             step, min_work = lanes.lanes, _MIN_WORK_LANES
         min_range = -(-min_work // max(1, engine.nu))
@@ -128,7 +128,7 @@ def _lane_evaluation(
     def run(first: int, end: int) -> FailedState | None:
         selection = slice(first, end)
         efforts = None if states.efforts is None else states.efforts[selection]
-        codes = library.many(
+        codes = library.accelerations_batch(
             numbers if numbers.ndim == 1 else numbers[selection],
             states.t[selection],
             states.q[selection],
@@ -176,8 +176,8 @@ def _looped_evaluation(
 
 def _state_error(engine: LoopedEngine, states: StateBatch, failed: FailedState) -> NumericalFailure:
     i = failed.index
-    error = engine.failed(failed.failure, float(states.t[i]), states.q[i], states.u[i])
-    error.args = (f"{_state_prefix(states.lead, i)}{error}",)
+    error = engine.evaluation_error(failed.failure, float(states.t[i]), states.q[i], states.u[i])
+    error.args = (f"{_state_prefix(states.leading_shape, i)}{error}",)
     return error
 
 
@@ -195,6 +195,6 @@ def _check_finite(engine: LoopedEngine, states: StateBatch, udot: Array) -> None
     row, column = (int(k[0]) for k in np.nonzero(~np.isfinite(udot)))
     name = engine.packed.layout.u_name(column)
     raise engine.not_finite(
-        f"{_state_prefix(states.lead, row)}the acceleration of {name}",
+        f"{_state_prefix(states.leading_shape, row)}the acceleration of {name}",
         float(states.t[row]), states.q[row], states.u[row],
     )  # fmt: skip

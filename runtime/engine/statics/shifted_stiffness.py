@@ -30,23 +30,23 @@ class ShiftedStiffness:
 
     def __init__(self, tangent: TangentMatrix, t: float, sizes: Array) -> None:
         self.tangent, self.t, self.sizes, self.sigma = tangent, t, sizes, 0.0
-        self.still, self.placed = np.zeros(tangent.nu), np.zeros(tangent.nq)
+        self.zero_speeds, self.placed = np.zeros(tangent.nu), np.zeros(tangent.nq)
         tangent.allow_negative()
         tangent.record.rows_of_motion = 1
         system, first_speeds = (
             tangent.engine.packed.system,
-            tangent.engine.packed.system.places["u"],
+            tangent.engine.packed.system.first_indices["u"],
         )
         closing_speeds = [
             first_speeds[closure.frame] + np.arange(system.body(closure.frame).nu)
             for closure in system.closures
         ]
         #: Indices of the dependent speeds of hinges that close loops.
-        self.own = np.concatenate([np.zeros(0, np.int64), *closing_speeds])
+        self.closing_speeds = np.concatenate([np.zeros(0, np.int64), *closing_speeds])
 
     def residual(self, q: Array) -> Array:
         """Compute the unbalanced efforts R (nu,) at q, to which subsequent calls refer."""
-        return self.tangent.residual(self.t, q, self.still, self.still)
+        return self.tangent.residual(self.t, q, self.zero_speeds, self.zero_speeds)
 
     def factor(self, sigma: float) -> None:
         """Factor K + sigma W; raises NumericalFailure if it is singular."""
@@ -60,27 +60,29 @@ class ShiftedStiffness:
         """
         x = self.tangent.solve(efforts)
         for _ in range(_MAX_REFINEMENTS):
-            residual_efforts = efforts - self._along(self.tangent.coordinates(x), self.sigma * x)
+            residual_efforts = efforts - self._directional_efforts(
+                self.tangent.coordinates(x), self.sigma * x
+            )
             change = self.tangent.solve(residual_efforts)
             x = x + change
             change_size, solution_size = self.length(change), self.length(x)
             if change_size <= _CONVERGED_CHANGE * solution_size:
                 return x
-        raise SolutionIsRounding("the stiffness is rounding here")
+        raise SolutionIsRounding("the stiffness is lost to rounding")
 
     def press(self, x: Array) -> Array:
         """Product K x (nu,)."""
-        return self._along(self.tangent.coordinates(x), self.still)
+        return self._directional_efforts(self.tangent.coordinates(x), self.zero_speeds)
 
     def inertia(self, x: Array) -> Array:
         """Product W x (nu,)."""
-        return self._along(self.placed, x)
+        return self._directional_efforts(self.placed, x)
 
     def length(self, x: Array) -> float:
         """Largest component of a motion in characteristic scales."""
         return float(np.abs(x / self.sizes).max(initial=0.0))
 
-    def _along(self, moved: Array, rates: Array) -> Array:
-        efforts = self.tangent.slope(0.0, moved, self.still, rates)
-        efforts[self.own] = 0.0
+    def _directional_efforts(self, moved: Array, rates: Array) -> Array:
+        efforts = self.tangent.slope(0.0, moved, self.zero_speeds, rates)
+        efforts[self.closing_speeds] = 0.0
         return efforts

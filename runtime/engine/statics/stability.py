@@ -54,14 +54,14 @@ class Stability:
 
 def find_stability(stiffness: ShiftedStiffness, q: Array) -> Stability:
     """Find the unstable and neutral motions of an equilibrium q (nq,)."""
-    return _StabilitySearch(stiffness).at(q)
+    return _StabilitySearch(stiffness).evaluate(q)
 
 
 class _StabilitySearch:
     def __init__(self, stiffness: ShiftedStiffness) -> None:
         self.stiffness = stiffness
 
-    def at(self, q: Array) -> Stability:
+    def evaluate(self, q: Array) -> Stability:
         self.stiffness.residual(q)
         largest = self._largest() or 1.0
         unstable, neutral, is_skew = list[Array](), list[Array](), False
@@ -85,7 +85,7 @@ class _StabilitySearch:
     def _largest(self) -> float:
         """Magnitude of the largest kappa, by power iteration with W^-1 K."""
         self.stiffness.factor(_LARGE_SIGMA)
-        motion, size = self._drawn(), 0.0
+        motion, size = self._random_motion(), 0.0
         for _ in range(_POWER_STEPS):
             norm = self._size(motion)
             if not norm > 0:
@@ -98,9 +98,9 @@ class _StabilitySearch:
         """Norm of a motion with the inertia W."""
         return math.sqrt(max(0.0, float(motion @ self.stiffness.inertia(motion))))
 
-    def _drawn(self) -> Array:
+    def _random_motion(self) -> Array:
         """Random motion that loops permit, by the current factorisation."""
-        random_efforts = np.random.default_rng(0).standard_normal(len(self.stiffness.still))
+        random_efforts = np.random.default_rng(0).standard_normal(len(self.stiffness.zero_speeds))
         motion = self.stiffness.solve(random_efforts)
         return np.asarray(motion / (float(np.abs(motion).max(initial=0.0)) or 1.0))
 
@@ -131,7 +131,7 @@ class _StabilitySearch:
             list[Array](),
             np.zeros((_MAX_VECTORS + 1, _MAX_VECTORS)),
         )
-        motion, size = self._drawn(), 1.0
+        motion, size = self._random_motion(), 1.0
         for k in range(_MAX_VECTORS + 1):
             for _ in range(2 if k else 0):
                 components = np.array(inertia_products) @ motion

@@ -65,7 +65,7 @@ class DirectionChoice:
     frame: Frame
     basis: Basis
     count: int
-    why: str
+    reason: str
 
 
 def direction_choices(
@@ -85,7 +85,7 @@ def direction_choices(
         frame = _rod_frame(beam, held, direction, frames["y"][0])
         basis = _basis(beam, data, held, direction, frame)
         buckles = direction == "twist" and len(chosen) == 2 and _can_buckle_sideways(data)
-        restrained = direction == "axial" and held.restrained
+        restrained = direction == "axial" and held.is_length_restrained
         count = _rod_count(beam, data, direction, basis, highest_bending, buckles, restrained)
         if count and not _is_left_out(beam, direction, idle):
             chosen.append(DirectionChoice(direction, frame, basis, count, ""))
@@ -100,7 +100,7 @@ def can_use_mean_frame(beam: Beam, chosen: tuple[DirectionChoice, ...]) -> bool:
 def in_mean_frame(chosen: tuple[DirectionChoice, ...]) -> tuple[DirectionChoice, ...]:
     """The same choices, all with the mean frame."""
     why = "the mass matrix stays definite there"
-    return tuple(replace(c, frame=Frame("mean"), why=why if c.why else "") for c in chosen)
+    return tuple(replace(c, frame=Frame("mean"), reason=why if c.reason else "") for c in chosen)
 
 
 def missing_static_shapes(
@@ -108,7 +108,7 @@ def missing_static_shapes(
 ) -> tuple[str, ...]:
     """Warnings about static shapes that are missing because the scene asks for fewer shapes."""
     messages = []
-    if held.restrained and all(c.direction != "axial" for c in chosen):
+    if held.is_length_restrained and all(c.direction != "axial" for c in chosen):
         messages.append(
             "modes: no axial shapes, but both ends are fixed along the beam, which cannot sag "
             "without them; give axial = 1 or more"
@@ -139,13 +139,13 @@ def _frame(
     if natural_kind is not None:
         x = held.x if natural_kind == "tangent" else 0.0
         return Frame(natural_kind, x), f"{beam.basis} shapes"
-    if direction not in held.turns:
-        return Frame("tangent", held.x), f"{held.said} holds the section"
-    if direction in held.heavy_rotor:
-        return Frame("tangent", held.x), f"the rotor of {held.said} holds the section"
-    if held.moves:
-        return Frame("mean"), f"{held.said} leaves the beam free"
-    return Frame("chord"), f"{held.said} leaves the section free to turn"
+    if direction not in held.free_rotations:
+        return Frame("tangent", held.x), f"{held.hinge_text} holds the section"
+    if direction in held.heavy_rotor_rotations:
+        return Frame("tangent", held.x), f"the rotor of {held.hinge_text} holds the section"
+    if held.has_free_translation:
+        return Frame("mean"), f"{held.hinge_text} leaves the beam free"
+    return Frame("chord"), f"{held.hinge_text} leaves the section free to turn"
 
 
 def _rod_frame(beam: Beam, held: BoundaryConditions, direction: str, bending: Frame) -> Frame:
@@ -153,7 +153,7 @@ def _rod_frame(beam: Beam, held: BoundaryConditions, direction: str, bending: Fr
     requested = beam.frame_kind != "auto" or beam.basis in _FRAME_OF_BASIS
     if bending.kind == "mean" or (requested and bending.kind == "tangent"):
         return bending
-    free = direction in held.turns - held.heavy_rotor - held.sprung
+    free = direction in held.free_rotations - held.heavy_rotor_rotations - held.spring_rotations
     return Frame("mean") if free and not requested else Frame("tangent", held.x)
 
 
@@ -165,9 +165,9 @@ def _basis(
 ) -> Basis:
     given = getattr(beam.shapes, direction, ()) if beam.shapes is not None else ()
     if beam.basis == GIVEN:
-        return Basis(GIVEN, given=tuple(ExpressionShape(e, data.length) for e in given))
+        return Basis(GIVEN, given_shapes=tuple(ExpressionShape(e, data.length) for e in given))
     base = frame.x if frame.kind == "tangent" else held.x
-    loaded = [end for end in held.ends if direction in end.moments or end.heavy]
+    loaded = [end for end in held.ends if direction in end.moments or end.is_heavy]
     others = tuple(sorted({end.x for end in loaded} - {base}))
     if beam.basis == STATIC:
         return Basis(STATIC, base, others or _static_interfaces(data, held, base))
@@ -177,10 +177,10 @@ def _basis(
         at_ends = all(x in (0.0, data.length) for x in others)
         if not at_ends:
             return Basis(STATIC, base, others)
-        sprung = {held.x} if direction in held.sprung else set()
+        sprung = {held.x} if direction in held.spring_rotations else set()
         slopes = tuple(sorted({e.x for e in loaded if direction in e.moments} | sprung))
         return Basis(SIMPLY_SUPPORTED, base, slopes=slopes)
-    if frame.kind == "mean" and (loaded or direction in held.sprung):
+    if frame.kind == "mean" and (loaded or direction in held.spring_rotations):
         return Basis(STATIC, base, others or _static_interfaces(data, held, base))
     if loaded and others:
         return Basis(STATIC, base, others)

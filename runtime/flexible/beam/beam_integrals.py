@@ -59,7 +59,9 @@ def _integrals(
     """
     values, slopes, curvatures = (shapes.rows(x, d) for d in range(3))
     strain = np.stack([slopes[0], slopes[3], curvatures[2], curvatures[1]])
-    rows = shape_rows(np.concatenate([values[:3], shapes.carried(slopes, values[3]), strain]))
+    rows = shape_rows(
+        np.concatenate([values[:3], shapes.inertia_rotation(slopes, values[3]), strain])
+    )
     all_shapes: Row = (np.zeros(1, dtype=np.intp), np.ones((1, len(x))))
     integrals = []
     for output in (kernel_terms("moments", *_PAIR_GROUPS)[name] for name in names):
@@ -110,7 +112,7 @@ def second_moments(shapes: BeamShapes, density: Array, x: Array, w: Array) -> tu
     `density` (3, m) is given at the points `x` and weights `w` of a quadrature.
     """
     outputs = kernel_terms("second_moments", *_SECOND_ORDER_GROUPS)
-    rotations = shape_rows(shapes.carried(shapes.rows(x, 1), shapes.rows(x, 0)[3]))
+    rotations = shape_rows(shapes.inertia_rotation(shapes.rows(x, 1), shapes.rows(x, 0)[3]))
     g, x_moment = _zero_moments(shapes.n)
     field_terms: dict[tuple[int | None, ...], list[tuple[Array, Term]]] = {}
     for integral, output in ((g, outputs["G"]), (x_moment, outputs["X"])):

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from mstmm.scene.tables.beam import Beam
     from mstmm.scene.tables.hinge import Hinge
 
-    _Acting = Chain | Spring | Bushing | Load
+    _LoadElement = Chain | Spring | Bushing | Load
 
 #: Axis of the rotation of a section by direction: bending along y rotates it about z.
 AXES = {"y": (0.0, 0.0, 1.0), "z": (0.0, 1.0, 0.0), "twist": (1.0, 0.0, 0.0)}
@@ -32,7 +32,7 @@ AXES = {"y": (0.0, 0.0, 1.0), "z": (0.0, 1.0, 0.0), "twist": (1.0, 0.0, 0.0)}
 MOSTLY = 0.7
 #: Share of the beam's mass, inertia or stiffness above which a body outboard of an end, a rotor at
 #: the inboard end or a spring counts as heavy or stiff.
-HEAVY = 0.1
+HEAVY_MASS_RATIO = 0.1
 
 #: Direction that a force at a section loads besides bending.
 _ALONG = ("axial",)
@@ -45,67 +45,68 @@ class End:
     """Loads at one section of a beam.
 
     `moments` are the directions that need static shapes: loaded by moments, or axially by forces;
-    `heavy` says whether a heavy body or stiff element acts there.
+    `is_heavy` says whether a heavy body or stiff element acts there.
     """
 
     x: float
     moments: frozenset[str] = frozenset()
-    heavy: bool = False
+    is_heavy: bool = False
 
 
 @dataclass(frozen=True)
 class BoundaryConditions:
     """Inboard hinge of a beam at `x` (m), and the loads on its ends.
 
-    The hinge leaves the rotations `turns` (directions) free, and translations if `moves`.  Heavy
-    rotors resist the rotations `heavy_rotor`; springs or motors act in those of `sprung`.
+    The hinge leaves the rotations `free_rotations` (directions) free, and translations if
+    `has_free_translation`.  Heavy rotors resist the rotations `heavy_rotor_rotations`; springs or
+    motors act in those of `spring_rotations`.
     """
 
     name: str  #: inboard end
     x: float
-    turns: frozenset[str]
-    moves: bool
-    heavy_rotor: frozenset[str] = frozenset()
-    sprung: frozenset[str] = frozenset()
+    free_rotations: frozenset[str]
+    has_free_translation: bool
+    heavy_rotor_rotations: frozenset[str] = frozenset()
+    spring_rotations: frozenset[str] = frozenset()
     ends: tuple[End, ...] = ()
-    said: str = ""  #: description of the hinge, for messages
-    restrained: bool = False  #: the rest of the scene constrains its length
+    hinge_text: str = ""  #: description of the hinge, for messages
+    is_length_restrained: bool = False  #: the rest of the scene constrains its length
 
 
 class BeamEnvironment:
     """Hinges, loads and outboard masses by body of a scene, computed once for all its beams."""
 
     def __init__(self, scene: Scene) -> None:
-        self.holds = inboard_hinges_by_body(scene)
+        self.inboard_hinges = inboard_hinges_by_body(scene)
         #: Cut hinges by outboard body, whose inboard hinge is another one.
-        self.closes: dict[str, list[Hinge]] = {}
+        self.cut_hinges: dict[str, list[Hinge]] = {}
         for hinge in scene.hinge:
-            if self.holds.get(hinge.outboard_body) is not hinge:
-                self.closes.setdefault(hinge.outboard_body, []).append(hinge)
-        self.carries: dict[str, list[Hinge]] = {}
+            if self.inboard_hinges.get(hinge.outboard_body) is not hinge:
+                self.cut_hinges.setdefault(hinge.outboard_body, []).append(hinge)
+        self.outboard_hinges: dict[str, list[Hinge]] = {}
         for hinge in scene.hinge:
-            self.carries.setdefault(hinge.inboard_body, []).append(hinge)
-        self.acts: dict[str, list[tuple[str, _Acting]]] = {}
-        acting: list[_Acting] = [*scene.chain, *scene.forces, *scene.load]
+            self.outboard_hinges.setdefault(hinge.inboard_body, []).append(hinge)
+        self.load_elements: dict[str, list[tuple[str, _LoadElement]]] = {}
+        acting: list[_LoadElement] = [*scene.chain, *scene.forces, *scene.load]
         for element in acting:
-            for reference in _acted_ends(element):
+            for reference in _loaded_ends(element):
                 name, end = split_reference(reference)
-                self.acts.setdefault(name, []).append((end or "root", element))
+                self.load_elements.setdefault(name, []).append((end or "root", element))
         self._masses = {b.name: b.mass if b.type == "rigid" else np.inf for b in scene.body}
         self._masses |= {b.name: b.mass for b in scene.beam}
-        for name in _coupled_bodies(scene, self.closes):
+        for name in _coupled_bodies(scene, self.cut_hinges):
             self._masses[name] = np.inf
         self.restrained = restrained_beams(scene)
         self._outboard_masses: dict[str, float] = {}
 
-    def mass_beyond(self, body: str) -> float:
+    def outboard_mass(self, body: str) -> float:
         """Mass (kg) of a body and of all bodies outboard of it; infinite if not known."""
         pending = [body]
         while pending:
             name = pending[-1]
             children = [
-                hinge.outboard_body for hinge in self.carries.get(name, ())
-                if self.holds.get(hinge.outboard_body) is hinge
+                hinge.outboard_body for hinge in self.outboard_hinges.get(name, ())
+                if self.inboard_hinges.get(hinge.outboard_body) is hinge
             ]  # fmt: skip
             missing = [child for child in children if child not in self._outboard_masses]
             if missing:
@@ -127,7 +128,7 @@ def _coupled_bodies(scene: Scene, closes: Mapping[str, list[Hinge]]) -> Iterator
         yield from (split_reference(element.from_)[0], split_reference(element.to)[0])
 
 
-def _acted_ends(element: _Acting) -> tuple[str, ...]:
+def _loaded_ends(element: _LoadElement) -> tuple[str, ...]:
     """References of the bodies and ends that an element acts on."""
     if isinstance(element, Load):
         return (element.on,)
@@ -140,8 +141,8 @@ def boundary_conditions(
     environment: BeamEnvironment, beam: Beam, data: BeamData
 ) -> BoundaryConditions:
     """Boundary conditions of a beam, from the hinges, springs and loads of the scene."""
-    ends = tuple(sorted(set(_ends(environment, beam, data)), key=lambda end: end.x))
-    hinge = environment.holds[beam.name]
+    ends = tuple(sorted(set(_end_loads(environment, beam, data)), key=lambda end: end.x))
+    hinge = environment.inboard_hinges[beam.name]
     name = hinge.outboard_end or "root"
     x, rotation = data.ends[name]
     free = _free_directions(rotation, free_axes(hinge))
@@ -150,12 +151,14 @@ def boundary_conditions(
         name,
         x,
         free,
-        hinge.facts is not None and hinge.facts.goes_anywhere,
-        heavy_rotor=free if has_heavy_rotor else frozenset(),
-        sprung=free if is_sprung or any(not e.is_zero for e in hinge.law.effort) else frozenset(),
+        hinge.facts is not None and hinge.facts.is_free,
+        heavy_rotor_rotations=free if has_heavy_rotor else frozenset(),
+        spring_rotations=free
+        if is_sprung or any(not e.is_zero for e in hinge.law.effort)
+        else frozenset(),
         ends=ends,
-        said=f"the {hinge.type} hinge",
-        restrained=beam.name in environment.restrained,
+        hinge_text=f"the {hinge.type} hinge",
+        is_length_restrained=beam.name in environment.restrained,
     )
 
 
@@ -184,7 +187,7 @@ def _has_stiff_spring_or_rotor(hinge: Hinge, data: BeamData) -> tuple[bool, bool
     stiffness, rotor_inertia = (
         _largest_rotational_entry(hinge, key) for key in ("stiffness", "inertia")
     )
-    return stiffness > HEAVY * bending, rotor_inertia > HEAVY * inertia
+    return stiffness > HEAVY_MASS_RATIO * bending, rotor_inertia > HEAVY_MASS_RATIO * inertia
 
 
 def _largest_rotational_entry(hinge: Hinge, key: str) -> float:
@@ -198,20 +201,22 @@ def _largest_rotational_entry(hinge: Hinge, key: str) -> float:
 # --- loads at the other sections ------------------------------------------------------------------
 
 
-def _ends(environment: BeamEnvironment, beam: Beam, data: BeamData) -> Iterator[End]:
-    for hinge in environment.carries.get(beam.name, ()):
+def _end_loads(environment: BeamEnvironment, beam: Beam, data: BeamData) -> Iterator[End]:
+    for hinge in environment.outboard_hinges.get(beam.name, ()):
         x, rotation = data.ends[hinge.inboard_end or "root"]
         free = _free_directions(rotation @ np.array(hinge.rotation), free_axes(hinge))
         if any(hinge.law.stiffness) or any(hinge.law.inertia) or _is_driven(hinge):
             free = frozenset()
-        closes = environment.holds.get(hinge.outboard_body) is not hinge
-        heavy = closes or environment.mass_beyond(hinge.outboard_body) > HEAVY * data.mass
+        closes = environment.inboard_hinges.get(hinge.outboard_body) is not hinge
+        heavy = (
+            closes or environment.outboard_mass(hinge.outboard_body) > HEAVY_MASS_RATIO * data.mass
+        )
         yield End(x, frozenset(AXES) - free, heavy)
-    for hinge in environment.closes.get(beam.name, ()):
+    for hinge in environment.cut_hinges.get(beam.name, ()):
         x, rotation = data.ends[hinge.outboard_end or "root"]
         free = frozenset() if _is_driven(hinge) else _free_directions(rotation, free_axes(hinge))
         yield End(x, frozenset(AXES) - free, True)
-    for end, element in environment.acts.get(beam.name, ()):
+    for end, element in environment.load_elements.get(beam.name, ()):
         x = data.ends[end][0]
         if isinstance(element, Load):
             if element.force_per_length is None:
@@ -223,7 +228,9 @@ def _ends(environment: BeamEnvironment, beam: Beam, data: BeamData) -> Iterator[
         elif isinstance(element, Bushing):
             along, about = element.stiffest
             yield End(
-                x, frozenset(AXES if about else ()), along > HEAVY * _cantilever_stiffness(data)
+                x,
+                frozenset(AXES if about else ()),
+                along > HEAVY_MASS_RATIO * _cantilever_stiffness(data),
             )
         else:
             yield End(x, frozenset(AXES), True)
@@ -231,7 +238,10 @@ def _ends(environment: BeamEnvironment, beam: Beam, data: BeamData) -> Iterator[
 
 def _is_stiff(spring: Spring, data: BeamData) -> bool:
     """Whether a spring is stiff against the beam as a cantilever, or of a user-defined type."""
-    return spring.type != "spring" or spring.law.stiffness > HEAVY * _cantilever_stiffness(data)
+    return (
+        spring.type != "spring"
+        or spring.law.stiffness > HEAVY_MASS_RATIO * _cantilever_stiffness(data)
+    )
 
 
 def _cantilever_stiffness(data: BeamData) -> float:

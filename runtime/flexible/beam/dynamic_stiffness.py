@@ -46,7 +46,7 @@ class Direction:
     and per shape.
     """
 
-    bends: bool
+    is_bending: bool
     inertia: float
     drag: float
     stiffness: float
@@ -58,7 +58,7 @@ class Direction:
         `modulus_factor` (k,) is m.
         """
         zeta = -(self.inertia * s**2 + self.drag * s) / modulus_factor
-        matrix, _ = _evaluate_kernel(self.bends, zeta)
+        matrix, _ = _evaluate_kernel(self.is_bending, zeta)
         return np.asarray(
             self.ends.T @ (self.stiffness * modulus_factor[:, None, None] * matrix) @ self.ends
         )
@@ -66,19 +66,19 @@ class Direction:
     def rigid(self) -> Array:
         """Mass (6, 6) of the frame in this direction, kg, kg*m, kg*m^2."""
         zeta = np.array([_SMALL_ZETA], dtype=np.complex128)
-        matrix = -_evaluate_kernel(self.bends, zeta)[0][0].real / _SMALL_ZETA
+        matrix = -_evaluate_kernel(self.is_bending, zeta)[0][0].real / _SMALL_ZETA
         ends = self.ends[:, :6]
         return np.asarray(self.inertia * self.stiffness * (ends.T @ matrix @ ends))
 
-    def clamped(self, omega: Array) -> NDArray[np.int64]:
+    def clamped_mode_count(self, omega: Array) -> NDArray[np.int64]:
         """Number (k,) of natural frequencies below omega with both ends clamped.
 
         Wittrick and Williams 1971.
         """
         zeta = self.inertia * omega**2
-        z = zeta**0.25 if self.bends else np.sqrt(zeta)
+        z = zeta**0.25 if self.is_bending else np.sqrt(zeta)
         waves = np.floor(z / np.pi).astype(np.int64)
-        if not self.bends:
+        if not self.is_bending:
             return waves
         _, divisor = _evaluate_kernel(True, zeta.astype(np.complex128))
         correction = (1 - (-1) ** waves * np.sign(divisor)) / 2
@@ -105,9 +105,9 @@ class HarmonicBeam:
         return 6 + len(self.static)
 
     @property
-    def told(self) -> tuple[object, ...]:
+    def cache_key(self) -> tuple[object, ...]:
         """Key that is equal for equal beams."""
-        parts = [(d.bends, d.inertia, d.drag, d.stiffness, d.ends.tobytes())
+        parts = [(d.is_bending, d.inertia, d.drag, d.stiffness, d.ends.tobytes())
                  for d in self.directions]  # fmt: skip
         return *parts, self.static.tobytes(), self.rigid.tobytes(), self.delay, self.loss
 
@@ -126,14 +126,14 @@ class HarmonicBeam:
         """Scale of the lowest frequency of the beam, rad/s: zeta = 1 in the slowest direction."""
         return float(min(direction.inertia**-0.5 for direction in self.directions))
 
-    def undamped(self) -> HarmonicBeam:
+    def without_damping(self) -> HarmonicBeam:
         """Beam without damping and drag."""
         directions = tuple(replace(direction, drag=0.0) for direction in self.directions)
         return replace(self, directions=directions, delay=0.0, loss=0.0)
 
-    def clamped(self, omega: Array) -> NDArray[np.int64]:
+    def clamped_mode_count(self, omega: Array) -> NDArray[np.int64]:
         """Number (k,) of undamped natural frequencies below omega with both ends clamped."""
-        counts = (direction.clamped(omega) for direction in self.directions)
+        counts = (direction.clamped_mode_count(omega) for direction in self.directions)
         return sum(counts, np.zeros(len(omega), np.int64))
 
 

@@ -17,15 +17,15 @@ from mstmm.errors import SceneError
 
 from .beam_data import BeamData
 from .frame_location import Frame
-from .gauss_quadrature import gauss_between, shape_density
+from .gauss_quadrature import gauss_points, shape_density
 from .shape_fields import Mode
 from .shape_functions import Shape, ShiftedShape
 
 #: Smallest norm of a shape without its rigid part, or without the shapes before it, relative to the
 #: shape; less is rounding.
-NOTHING_LEFT = 1e-9
+MIN_REMAINDER = 1e-9
 #: Largest condition number of the mass matrix of the shapes, each scaled to norm one.
-WORST_CONDITION = 1e11
+MAX_CONDITION = 1e11
 
 
 def modes_in_frame(
@@ -46,19 +46,19 @@ def modes_in_frame(
         values = np.sqrt(weight) * (shape(x) - a - b * x)
         scale = np.linalg.norm(np.sqrt(weight) * shape(x))
         residual = values / scale
-        if np.linalg.norm(residual) < NOTHING_LEFT:
+        if np.linalg.norm(residual) < MIN_REMAINDER:
             notes.append(f"shape {name} is a rigid motion; left out")
             continue
         residual = residual / np.linalg.norm(residual)
         for previous in basis * 2:  # the second pass removes rounding errors of the first
             residual = residual - previous * (previous @ residual)
-        if np.linalg.norm(residual) < NOTHING_LEFT:
+        if np.linalg.norm(residual) < MIN_REMAINDER:
             notes.append(f"shape {name} is linearly dependent on the shapes before it; left out")
             continue
         basis.append(residual / np.linalg.norm(residual))
         deformations.append(values / np.linalg.norm(values))
         shifted = shape if a == 0.0 and b == 0.0 else ShiftedShape(shape, a, b)
-        modes.append(Mode(f"{direction}{len(modes) + 1}", direction, shifted, turned=-b))
+        modes.append(Mode(f"{direction}{len(modes) + 1}", direction, shifted, frame_rotation=-b))
     if shapes and not modes:
         raise SceneError(
             f'beam "{data.name}": its {len(shapes)} shapes along {direction} are rigid motions; '
@@ -70,8 +70,8 @@ def modes_in_frame(
 
 def _with_rotation_sign(mode: Mode, direction: str) -> Mode:
     """Mode with the sign of its frame rotation: v' about z, -w' about y."""
-    if direction == "z" and mode.turned:
-        return Mode(mode.name, direction, mode.shape, -mode.turned)
+    if direction == "z" and mode.frame_rotation:
+        return Mode(mode.name, direction, mode.shape, -mode.frame_rotation)
     return mode if direction in ("y", "z") else Mode(mode.name, direction, mode.shape)
 
 
@@ -80,10 +80,10 @@ def _check_condition(data: BeamData, direction: str, deformations: list[Array]) 
         return
     singular = np.linalg.svd(np.array(deformations), compute_uv=False)
     condition = (singular[0] / max(singular[-1], 1e-300)) ** 2
-    if condition > WORST_CONDITION:
+    if condition > MAX_CONDITION:
         raise SceneError(
             f'beam "{data.name}": its {len(deformations)} shapes along {direction} are linearly '
-            f"dependent (mass matrix condition {condition:.1e}, limit {WORST_CONDITION:.0e}); use "
+            f"dependent (mass matrix condition {condition:.1e}, limit {MAX_CONDITION:.0e}); use "
             "fewer or more distinct shapes"
         )
 
@@ -94,7 +94,7 @@ def _weighted_rule(
     """Quadrature points x (m), mass (kg) and rotary inertia (kg m^2) at them, in one direction."""
     places = np.unique([*data.breaks, *(b for shape in shapes for b in shape.breaks)])
     places = places[(places >= 0) & (places <= data.length)]
-    x, w = gauss_between(places, shape_density(shapes))
+    x, w = gauss_points(places, shape_density(shapes))
     mass, yy, zz = data.inertia[:, data.piece(x)]
     if direction == "twist":
         polar = yy + zz

@@ -33,13 +33,13 @@ def shape_density(shapes: Sequence[Shape]) -> Density:
     """Largest density of half-waves of the shapes that are not zero in an interval."""
     spans = [(min(s.breaks), max(s.breaks), s.density) for s in shapes]
 
-    def between(a: float, b: float) -> float:
+    def max_density(a: float, b: float) -> float:
         return max((d for first, last, d in spans if first < b and a < last), default=0.0)
 
-    return between
+    return max_density
 
 
-def gauss_between(places: Iterable[float], density: Density) -> tuple[Array, Array]:
+def gauss_points(places: Iterable[float], density: Density) -> tuple[Array, Array]:
     """Gauss points and weights (m) for products of two shapes, between given positions (m).
 
     `places` are ascending; `density` gives the half-waves per metre between two of them.  Long
@@ -79,7 +79,7 @@ class Antiderivatives:
                 count += order
         self.points = np.concatenate([cell.points for cell in self._cells])
 
-    def of(self, values: Array, x: Array) -> tuple[Array, Array]:
+    def integrate(self, values: Array, x: Array) -> tuple[Array, Array]:
         """First and second integrals (..., m) at ascending x (m,), of values (..., N) at points."""
         once, twice = (np.empty((*values.shape[:-1], len(x))) for _ in range(2))
         total, moment = (np.zeros((*values.shape[:-1], 1)) for _ in range(2))

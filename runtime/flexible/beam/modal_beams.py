@@ -54,18 +54,17 @@ class BeamBodies:
         data = beam_data(beam)
         conditions = boundary_conditions(self._environment, beam, data)
         idle = self._idle_directions(beam)
-        support = self._supports.of(beam.name)
+        support = self._supports.support_of(beam.name)
         key = repr((beam.model_copy(update={"name": ""}), conditions, support, sorted(idle)))
         if key not in self._cache:
             self._cache[key] = checked_result(
-                f'beam "{beam.name}"',
-                lambda: _beam_body(beam, data, conditions, support, idle),
+                f'beam "{beam.name}"', lambda: _beam_body(beam, data, conditions, support, idle)
             )
         body = self._cache[key]
         assert body.shapes is not None
         spans = {
             load.name: body.shapes.mean_section(*_span(load, data.length))
-            for _, load in self._environment.acts.get(beam.name, ())
+            for _, load in self._environment.load_elements.get(beam.name, ())
             if isinstance(load, Load) and load.force_per_length is not None
         }
         messages = tuple(f'beam "{beam.name}": {text}' for text in body.warnings)
@@ -143,7 +142,7 @@ def _stays_definite(body: ModalBody, held: BoundaryConditions, support: Support)
 def _section_rotations(body: ModalBody) -> Array:
     """Rotation vectors (m, 3, n) of sections along a beam per mode, rad."""
     assert body.shapes is not None
-    return body.shapes.at(np.linspace(0.0, body.shapes.length, 2 * body.n + 3)).theta
+    return body.shapes.values_at(np.linspace(0.0, body.shapes.length, 2 * body.n + 3)).theta
 
 
 def _body_of_choices(
@@ -160,9 +159,9 @@ def _body_of_choices(
         direction_modes, shape_notes = modes_in_frame(data, choice.direction, shapes, choice.frame)
         modes += direction_modes
         notes += [_choice_note(choice, len(direction_modes)), *shape_notes]
-    if any(c.frame.kind != "tangent" and c.direction in conditions.turns for c in chosen):
+    if any(c.frame.kind != "tangent" and c.direction in conditions.free_rotations for c in chosen):
         notes.append(
-            f"the angle of {conditions.said} is that of the section "
+            f"the angle of {conditions.hinge_text} is that of the section "
             f'"{conditions.name}", not of the frame'
         )
     frames = [c.frame for c in chosen]
@@ -195,7 +194,7 @@ def _body_of_choices(
 def _choice_note(choice: DirectionChoice, count: int) -> str:
     frame = choice.frame
     where = f" at x = {frame.x:g} m" if frame.kind == "tangent" else ""
-    why = f", because {choice.why}" if choice.why else ""
+    why = f", because {choice.reason}" if choice.reason else ""
     shapes = f"{count} {choice.basis.kind} shape{'s' if count != 1 else ''}"
     return f"{choice.direction}: {shapes}, frame {frame.kind}{where}{why}"
 

@@ -57,7 +57,7 @@ class PlanarMotionCheck:
             self._planes[key] = self._in_plane(n)
         return not self._planes[key]
 
-    def stay(self, beam: str, axis: int, hinges: Sequence[Hinge]) -> bool:
+    def is_planar(self, beam: str, axis: int, hinges: Sequence[Hinge]) -> bool:
         """Whether all motions of the hinges are planar, normal to axis 1 or 2 of the beam."""
         n = self._rotations[beam][:, axis]
         return all(self._is_hinge_planar(hinge, n) for hinge in hinges)
@@ -183,7 +183,7 @@ class PlanarMotionCheck:
             return False
         body, _, end_rotation = self._end_pose(hinge.outboard)
         rotation = self._rotations[body] @ end_rotation
-        if facts.steady:
+        if facts.constant_subspace:
             turned = ((rotation @ np.array(t), rotation @ np.array(r)) for t, r in motions)
             return all(_is_planar(t, r, n) for t, r in turned)
         z = rotation @ np.array(hinge_frames(hinge)[1])[:, 2]

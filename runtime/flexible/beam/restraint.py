@@ -49,7 +49,7 @@ def restrained_beams(scene: Scene) -> frozenset[str]:
 def _mobility(check: PlanarMotionCheck, beam: str, block: list[Edge], loops: int) -> int:
     """Mobility of a block by count, planar if all its hinges move in a plane of the beam."""
     hinges = [edge.hinge for edge in block if edge.hinge is not None]
-    in_plane = not check.possible or any(check.stay(beam, axis, hinges) for axis in (1, 2))
+    in_plane = not check.possible or any(check.is_planar(beam, axis, hinges) for axis in (1, 2))
     per_body = 3 if in_plane else 6  # 3 is the weaker claim where the poses are unknown
     free_by_constraints = sum(per_body - edge.rows for edge in block if edge.hinge is None)
     return sum(map(_free_coordinates, hinges)) + free_by_constraints - per_body * loops

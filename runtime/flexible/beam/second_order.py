@@ -42,9 +42,9 @@ class SecondOrder:
 
     @cached_property
     def _rigid(self) -> Array:
-        return _RigidMotion(self).removed(self._frames)
+        return _RigidMotion(self).removed_field(self._frames)
 
-    def at(self, x: Array, carried: bool = False) -> Array:
+    def field_at(self, x: Array, carried: bool = False) -> Array:
         """g (m, 6, n, n) at sections x (m,)."""
         g = np.empty((len(x), 6, self.shapes.n, self.shapes.n))
         for chunk in chunk_slices(len(x), 12 * self.shapes.n**2):
@@ -64,7 +64,7 @@ class SecondOrder:
             sums[:, 4:] = 0.0
         return sums
 
-    def of(self, x: Array, a: Array, b: Array, carried: bool = False) -> Array:
+    def evaluate(self, x: Array, a: Array, b: Array, carried: bool = False) -> Array:
         """Values a^T g b (t, m, 6) at sections x (m,) for modal coordinates a and b (t, n)."""
         rows = len(self._rates.points) * 32
         values = np.empty((len(a), len(x), 6))
@@ -78,7 +78,7 @@ class SecondOrder:
             pairs = (a[:, :, None] * b[:, None, :]).reshape(len(a), -1)
             g = _pair_matrix(self, x.tobytes(), carried)
             return np.asarray(pairs @ g).reshape(len(a), len(x), 6)
-        values = self._rates.of(x, a, b)
+        values = self._rates.evaluate(x, a, b)
         if carried and not self.shapes.rotary:
             values[..., 4:] = 0.0
         rigid = np.stack([((a @ g) * b).sum(axis=1) for g in self._rigid], axis=1)
@@ -92,7 +92,7 @@ _FEW_SHAPES = 25
 @lru_cache(maxsize=16)
 def _pair_matrix(field: SecondOrder, places: bytes, carried: bool) -> Array:
     """g at sections as a matrix (n n, m 6)."""
-    g = field.at(np.frombuffer(places), carried)
+    g = field.field_at(np.frombuffer(places), carried)
     return np.ascontiguousarray(np.moveaxis(g, (2, 3), (0, 1)).reshape(field.shapes.n**2, -1))
 
 
@@ -117,7 +117,7 @@ class _RigidMotion:
         self.field, self.shapes = field, field.shapes
         self._sections: dict[float, Array] = {0.0: np.zeros((6, self.shapes.n, self.shapes.n))}
 
-    def removed(self, frames: Mapping[str, Frame]) -> Array:
+    def removed_field(self, frames: Mapping[str, Frame]) -> Array:
         rigid = np.zeros((6, self.shapes.n, self.shapes.n))
         if not frames:
             return rigid

@@ -58,14 +58,14 @@ class Rates:
             _add_terms(sums[:, row], self._displacement_fields, terms, once)
         return sums
 
-    def of(self, x: Array, a: Array, b: Array) -> Array:
+    def evaluate(self, x: Array, a: Array, b: Array) -> Array:
         """Values a^T g b (t, m, 6) at sections x (m,) for modal coordinates a and b (t, n)."""
         order = np.argsort(x)
         x = np.clip(x[order], 0.0, self._length)
         rates = _evaluate_rates(self._rotation_terms, self._rotation_fields, a, b)
-        rotation, integral = self._integrals.of(rates, x)
+        rotation, integral = self._integrals.integrate(rates, x)
         rates = _evaluate_rates(self._displacement_terms, self._displacement_fields, a, b)
-        displacement, _ = self._integrals.of(rates, x)
+        displacement, _ = self._integrals.integrate(rates, x)
         displacement += np.tensordot(self._rotation_factors, integral, axes=1)
         values = np.empty((len(a), len(x), 6))
         values[:, order] = np.moveaxis(np.concatenate([displacement, rotation]), 0, 2)

@@ -13,7 +13,7 @@ from ..memory_chunks import chunk_slices
 from ..modal_port import ModalPort
 from .beam_data import BeamData
 from .frame_location import Frame
-from .gauss_quadrature import gauss_between
+from .gauss_quadrature import gauss_points
 from .second_order import SecondOrder
 from .shape_fields import Mode, ShapeFields
 
@@ -25,11 +25,7 @@ class BeamShapes(ShapeFields):
     """
 
     def __init__(
-        self,
-        data: BeamData,
-        modes: tuple[Mode, ...],
-        stiffening: bool,
-        frames: Mapping[str, Frame],
+        self, data: BeamData, modes: tuple[Mode, ...], stiffening: bool, frames: Mapping[str, Frame]
     ) -> None:
         super().__init__(data, modes)
         self.stiffening = stiffening
@@ -42,7 +38,7 @@ class BeamShapes(ShapeFields):
 
     def ports(self, x: Array) -> Iterator[ModalPort]:
         """Sections at x (m,) as ports, with the axes of the beam."""
-        values = self.at(x)
+        values = self.values_at(x)
         for chunk in chunk_slices(len(x), 12 * self.n**2):
             second = self._second_order_sums(x[chunk], np.eye(len(x[chunk])))
             phi, theta = values.phi[chunk], values.theta[chunk]
@@ -52,9 +48,9 @@ class BeamShapes(ShapeFields):
     def mean_section(self, start: float, end: float) -> ModalPort:
         """Mean of the sections between `start` and `end` (m), on which a uniform line load acts."""
         inner = [x for x in self.pieces if start < x < end]
-        x, w = gauss_between((start, *inner, end), self.density)
+        x, w = gauss_points((start, *inner, end), self.density)
         w = w / (end - start)
-        values = self.at(x)
+        values = self.values_at(x)
         phi, theta = (np.einsum("m,mak->ak", w, v) for v in (values.phi, values.theta))
         return self._port((start + end) / 2, phi, theta, self._second_order_sums(x, w[None])[0])
 

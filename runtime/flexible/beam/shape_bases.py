@@ -32,35 +32,35 @@ SIMPLY_SUPPORTED, STATIC, GIVEN = "simply-supported", "static+fixed-interface", 
 class Basis:
     """Shape basis in one direction.
 
-    `base` (m) is the clamped section, `others` (m) are further interfaces of static shapes.
-    Simply supported shapes get a static shape with unit end slope at each of `slopes` (m).
+    `base` (m) is the clamped section, `other_interfaces` (m) are further interfaces of static
+    shapes. Simply supported shapes get a static shape with unit end slope at each of `slopes` (m).
     """
 
     kind: str
     base: float = 0.0
-    others: tuple[float, ...] = ()
+    other_interfaces: tuple[float, ...] = ()
     slopes: tuple[float, ...] = ()
-    given: tuple[ExpressionShape, ...] = ()
+    given_shapes: tuple[ExpressionShape, ...] = ()
 
 
 def static_count(basis: Basis, direction: str) -> int:
     """Number of static shapes of a basis."""
     per_interface = 2 if direction in ("y", "z") else 1
     if basis.kind == STATIC:
-        return per_interface * len(basis.others)
+        return per_interface * len(basis.other_interfaces)
     return len(basis.slopes) if direction in ("y", "z") else 0
 
 
 def basis_shapes(data: BeamData, direction: str, basis: Basis, count: int) -> list[Shape]:
     """Shapes of a basis; `count` for each part of a beam that is clamped at an inner section."""
     if basis.kind == GIVEN:
-        return list(basis.given)
+        return list(basis.given_shapes)
     bends = direction in ("y", "z")
     if basis.kind == STATIC:
         statics = (bending_static_shapes if bends else rod_static_shapes)(
-            data, direction, basis.base, basis.others
+            data, direction, basis.base, basis.other_interfaces
         )
-        interfaces = sorted({basis.base, *basis.others})
+        interfaces = sorted({basis.base, *basis.other_interfaces})
         fixed_count = count - len(statics)
         if fixed_count <= 0:
             return list(statics[:count])

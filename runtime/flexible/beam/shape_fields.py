@@ -10,7 +10,7 @@ from mstmm.array_validation import Array
 
 from . import beam_kernels
 from .beam_data import BeamData, BeamSections
-from .gauss_quadrature import gauss_between, shape_density
+from .gauss_quadrature import gauss_points, shape_density
 from .shape_functions import Shape
 
 #: Directions in the order of the modal coordinates.
@@ -23,14 +23,14 @@ ROW = {"axial": 0, "y": 1, "z": 2, "twist": 3}
 class Mode:
     """One modal coordinate: direction and shape.
 
-    `turned` is the rigid rotation (rad) per unit that the frame conditions removed from the shape.
-    The inertia of the sections rotates by it even where rotary inertia is neglected.
+    `frame_rotation` is the rigid rotation (rad) per unit that the frame conditions removed from the
+    shape. The inertia of the sections rotates by it even where rotary inertia is neglected.
     """
 
     name: str
     direction: str
     shape: Shape
-    turned: float = 0.0
+    frame_rotation: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class ShapeValues:
     phi: Array  #: (m, 3, n) displacement of the axis
     theta: Array  #: (m, 3, n) rotation vector of the section
     curvature: Array  #: (m, 3, n) d theta / dx: rate of twist, -w'', v''
-    stretch: Array  #: (m, n) s'
+    axial_strain: Array  #: (m, n) s'
 
 
 class ShapeFields:
@@ -82,7 +82,7 @@ class ShapeFields:
 
     def rule(self) -> tuple[Array, Array]:
         """Quadrature points and weights (m) along the beam, exact for products of two shapes."""
-        return gauss_between(self.pieces, self.density)
+        return gauss_points(self.pieces, self.density)
 
     def rows(self, x: Array, d: int) -> Array:
         """Derivatives (4, n, m) of order d of s, v, w, psi per mode."""
@@ -91,7 +91,7 @@ class ShapeFields:
             values[ROW[mode.direction], k] = mode.shape(x, d)
         return values
 
-    def carried(self, slopes: Array, twist: Array) -> Array:
+    def inertia_rotation(self, slopes: Array, twist: Array) -> Array:
         """Rotation (3, n, m) of the inertia of sections per mode, from d(s, v, w, psi)/dx."""
         rotation = np.zeros((3, *twist.shape))
         rotation[0] = twist
@@ -100,10 +100,10 @@ class ShapeFields:
             return rotation
         for k, mode in enumerate(self.modes):
             if mode.direction in ("y", "z"):
-                rotation[2 if mode.direction == "y" else 1, k] = mode.turned
+                rotation[2 if mode.direction == "y" else 1, k] = mode.frame_rotation
         return rotation
 
-    def at(self, x: Array) -> ShapeValues:
+    def values_at(self, x: Array) -> ShapeValues:
         """Displacements and rotations per mode at sections x (m,)."""
         x = np.atleast_1d(np.asarray(x, dtype=float))
         values, slopes, curvatures = (self.rows(x, d) for d in range(3))

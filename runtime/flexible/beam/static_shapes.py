@@ -82,7 +82,7 @@ def bending_eigenfunctions(
     fixed = [2 * nearest_node(nodes, x) for x in (*clamped, *supported)]
     fixed += [2 * nearest_node(nodes, x) + 1 for x in clamped]
     vectors = _eigenvectors(k, m, fixed, skip + count)[:, skip:]
-    return [_cubic(nodes, _normalised(nodes, u)) for u in vectors.T]
+    return [_cubic(nodes, _normalise(nodes, u)) for u in vectors.T]
 
 
 def bending_matrices(data: BeamData, direction: str, nodes: Array) -> tuple[Array, Array]:
@@ -154,7 +154,7 @@ def rod_eigenfunctions(
     ends = element_nodes(data, count + skip, fixed)
     nodes, k, m = rod_matrices(data, direction, ends)
     vectors = _eigenvectors(k, m, [nearest_node(nodes, x) for x in fixed], skip + count)[:, skip:]
-    return [_parabola(ends, _normalised(ends, u)) for u in vectors.T]
+    return [_parabola(ends, _normalise(ends, u)) for u in vectors.T]
 
 
 def rod_matrices(data: BeamData, direction: str, ends: Array) -> tuple[Array, Array, Array]:
@@ -210,7 +210,7 @@ def _eigenvectors(k: Array, m: Array, fixed: Iterable[int], count: int) -> Array
     return full
 
 
-def _normalised(nodes: Array, u: Array) -> Array:
+def _normalise(nodes: Array, u: Array) -> Array:
     """Nodal values scaled to a mean square of about one, positive where first nonzero."""
     values = u[::2]
     scale = np.sqrt(np.trapezoid(values**2, nodes) / (nodes[-1] - nodes[0]))

@@ -53,8 +53,8 @@ class Reduction:
 
     Attributes:
         sections: the model with sections at its ends.
-        held: port of a tangent frame, which also supports the body in static solutions.
-        frame: "tangent" (shapes vanish at `held`) or "mean" (shapes carry no momentum).
+        held_port: port of a tangent frame, which also supports the body in static solutions.
+        frame: "tangent" (shapes vanish at `held_port`) or "mean" (shapes carry no momentum).
         shapes: (u, n), m per m of modal coordinate.
         frequencies: (n,) rad/s, ascending, of the body with its other ends free.
         static: number of static shapes; fixed: number of vibration modes.
@@ -62,7 +62,7 @@ class Reduction:
     """
 
     sections: Sections
-    held: Port
+    held_port: Port
     frame: str
     shapes: Array
     frequencies: Array
@@ -110,13 +110,13 @@ def reduce(
     if release is not None and (free_count == 6 or (free_count and not others)):
         assumed = _hinged_shapes(sections, held, others, release, modes)
     else:
-        release, clamped = None, sections.clamped(loaded)
+        release, clamped = None, sections.clamp(loaded)
         blocks = [clamped.constraint_shapes(port) for port in others]
         blocks.append(clamped.full(fixed_interface_modes(clamped, modes)))
         assumed = np.hstack(blocks)
     shapes = sections.expand @ assumed
     if not shapes.shape[1]:
-        raise model.refuse(
+        raise model.error(
             "modes = 0 leaves no shape, because only one end is loaded; give modes = 1 or more, "
             "or describe it as a [[body]]"
         )
@@ -125,7 +125,7 @@ def reduce(
     shapes, frequencies = orthogonalise(model, shapes)
     kept = frequencies <= (np.inf if highest is None else highest)
     if not kept.any():
-        raise model.refuse(
+        raise model.error(
             f"highest_frequency: expected at least the lowest frequency, {frequencies[0]:.6g} "
             f"rad/s, found {highest:.6g}; raise it, or describe the body as a rigid [[body]]"
         )
@@ -141,14 +141,14 @@ def resolution(reduction: Reduction, release: Release | None) -> float:
     The richer model for comparison adds the static deflections under the inertia of the shapes,
     one step of inverse iteration.
     """
-    sections, held, model = reduction.sections, reduction.held, reduction.sections.model
+    sections, held, model = reduction.sections, reduction.held_port, reduction.sections.model
     at_origin = model.rigid @ twist_transform(-held.position)
     motions = at_origin @ (np.zeros((6, 0)) if release is None else release.twists)
     shapes = reduction.shapes - at_origin @ reduction.motion(held)
     coupling = motions.T @ model.mass
     rigid_parts = np.linalg.solve(coupling @ motions, coupling @ shapes)
     loads = sections.expand.T @ (model.mass @ (shapes - motions @ rigid_parts))
-    added = sections.expand @ sections.clamped([held]).statics(np.asarray(loads))
+    added = sections.expand @ sections.clamp([held]).statics(np.asarray(loads))
 
     def frequencies(columns: Array) -> Array:
         momentum = coupling @ columns
@@ -168,10 +168,10 @@ def _hinged_shapes(
     """
     at_origin = twist_transform(-held.position)
     motions = sections.rigid @ (at_origin @ release.twists)
-    clamped = sections.clamped([held])
+    clamped = sections.clamp([held])
     rows = [sections.rows[port.name].toarray() for port in other_ports]
     rows.append(release.loaded.T @ sections.rows[held.name].toarray())
-    static = clamped.statics(sections.relieved(np.vstack(rows).T, motions))
+    static = clamped.statics(sections.relieve_inertia(np.vstack(rows).T, motions))
     return np.hstack([static, clamped.full(fixed_interface_modes(clamped, modes, motions))])
 
 
@@ -184,7 +184,7 @@ def fixed_interface_modes(clamped: Clamped, modes: int, motions: Array | None = 
         return np.zeros((len(clamped.free), 0))
     model = clamped.sections.model
     if modes > clamped.count:
-        raise model.refuse(
+        raise model.error(
             f"modes: expected at most {clamped.count} fixed-interface modes, as many as there are "
             f"unknowns between the ends, found {modes}; use fewer modes or a finer mesh"
         )
@@ -194,7 +194,7 @@ def fixed_interface_modes(clamped: Clamped, modes: int, motions: Array | None = 
     squares, vectors = (_dense_modes if is_dense else _sparse_modes)(clamped, relieved_mass, modes)
     usable = int(np.count_nonzero(np.isfinite(squares) & (squares > 0)))
     if usable < modes:
-        raise model.refuse(
+        raise model.error(
             f"modes: expected at most {usable}, as many as there are modes with mass between the "
             f"ends, found {modes}; use fewer modes"
         )
@@ -241,7 +241,7 @@ def _dense_modes(clamped: Clamped, mass: _RelievedMass, modes: int) -> tuple[Arr
     try:
         inverse, vectors = linalg.eigh((m + m.T) / 2, (k + k.T) / 2)
     except np.linalg.LinAlgError:
-        raise clamped.sections.model.refuse(
+        raise clamped.sections.model.error(
             "stiffness: expected a body that is stiff with its ends fixed, found one that moves "
             "without strain; look for a mechanism inside it"
         ) from None
@@ -268,7 +268,7 @@ def _sparse_modes(clamped: Clamped, mass: _RelievedMass, modes: int) -> tuple[Ar
             stiffness, k=modes, M=mass_operator, sigma=0.0, OPinv=operator, v0=start, which="LM"
         )
     except ArpackError as failure:
-        raise clamped.sections.model.refuse(
+        raise clamped.sections.model.error(
             f"modes: the {modes} lowest modes with fixed ends were not found ({failure}); use "
             "fewer modes, and look for parts without mass or far softer than the rest"
         ) from None
@@ -291,12 +291,12 @@ def orthogonalise(model: ElasticModel, shapes: Array) -> tuple[Array, Array]:
     try:
         squares, combination = linalg.eigh((stiffness + stiffness.T) / 2, (mass + mass.T) / 2)
     except np.linalg.LinAlgError:
-        raise model.refuse(
+        raise model.error(
             "expected linearly independent shapes with mass, found dependent or massless ones; use "
             "fewer modes, or a mass matrix without zero directions"
         ) from None
     if squares[0] <= _STRAINLESS * squares[-1]:
-        raise model.refuse(
+        raise model.error(
             "stiffness: expected strain in every shape, found a motion without any: a mechanism "
             "inside the body, or pieces that are not joined"
         )

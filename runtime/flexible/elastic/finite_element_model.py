@@ -89,7 +89,7 @@ class ElasticModel:
         acceleration[:, direction] = weight
         return np.asarray(self.mass @ acceleration.reshape(-1))
 
-    def refuse(self, what: str) -> SceneError:
+    def error(self, what: str) -> SceneError:
         """Error about this body."""
         return SceneError(f"{self.where}: {what}")
 

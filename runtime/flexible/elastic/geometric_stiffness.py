@@ -47,11 +47,11 @@ def second_order_moments(reduction: Reduction, ports: list[Port]) -> SecondOrder
     if model.stress is None:
         zeros = {port.name: np.zeros((6, n, n)) for port in ports}
         return SecondOrder(np.zeros((3, n, n)), np.zeros((3, 3, n, n)), zeros)
-    moving = [p for p in ports if reduction.frame == "mean" or p is not reduction.held]
+    moving = [p for p in ports if reduction.frame == "mean" or p is not reduction.held_port]
     loads = np.hstack([_body_loads(reduction), *(_port_loads(reduction, p) for p in moving)])
     if reduction.frame == "mean":
-        loads = reduction.sections.relieved(loads, reduction.sections.rigid)
-    static = reduction.sections.clamped([reduction.held]).statics(loads)
+        loads = reduction.sections.relieve_inertia(loads, reduction.sections.rigid)
+    static = reduction.sections.clamp([reduction.held_port]).statics(loads)
     stiffnesses = model.stress(reduction.sections.expand @ static, reduction.shapes)
     stiffnesses = (stiffnesses + stiffnesses.transpose(0, 2, 1)) / 2
     if reduction.frame == "mean":
@@ -68,8 +68,8 @@ def truncation(reduction: Reduction, ports: list[Port]) -> Truncation:
     inertia = -sections.expand.T @ (sections.model.mass @ shapes)
     wrenches = [sections.rows[port.name].toarray().T for port in ports]
     loads = np.hstack([*wrenches, _body_loads(reduction)[:, 3:], inertia])
-    loads = sections.relieved(loads, sections.rigid)
-    displacements = sections.clamped([reduction.held]).statics(loads)
+    loads = sections.relieve_inertia(loads, sections.rigid)
+    displacements = sections.clamp([reduction.held_port]).statics(loads)
     modal_loads = sections.unknowns(shapes).T @ loads
     modal_stiffness = sections.model.inertia[0, 0] * reduction.frequencies**2
     kept = modal_loads.T @ (modal_loads / modal_stiffness[:, None])

@@ -91,7 +91,7 @@ def _selected_nodes(model: ElasticModel, name: str, table: Any) -> Integers:
     if not len(nodes):
         nearest = int(np.argmin(distance))
         low, high = points.min(axis=0), points.max(axis=0)
-        raise model.refuse(
+        raise model.error(
             f"ends.{name}: the {region} contains no node of the body, which extends from "
             f"{_format_point(low)} to {_format_point(high)} m; the nearest node "
             f"{_format_point(points[nearest])} is {distance[nearest]:.4g} m away; move or widen "
@@ -106,7 +106,7 @@ def _nodes_by_number(model: ElasticModel, name: str, numbers: Any) -> Integers:
     invalid = [int(node) for node in nodes if not 0 <= node < count]
     if invalid or not len(nodes):
         found = ", ".join(map(str, invalid[:5])) or "none"
-        raise model.refuse(
+        raise model.error(
             f"ends.{name}: nodes: expected numbers from 0 to {count - 1}, found {found}; number "
             "the nodes in the order of the file"
         )
@@ -115,7 +115,7 @@ def _nodes_by_number(model: ElasticModel, name: str, numbers: Any) -> Integers:
 
 def _nodes_of_set(model: ElasticModel, name: str, wanted: str) -> Integers:
     if wanted not in model.sets:
-        raise model.refuse(
+        raise model.error(
             f"ends.{name}: the mesh has no named boundary {wanted!r}"
             f"{did_you_mean(wanted, model.sets)}"
         )
@@ -129,7 +129,7 @@ def _check_rotation_defined(model: ElasticModel, name: str, nodes: Integers) -> 
     points = model.nodes[nodes]
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     if len(nodes) < 3 or spread[1] <= TOLERANCE * model.size:
-        raise model.refuse(
+        raise model.error(
             f"ends.{name}: expected three or more nodes that do not lie on one line, to define the "
             f"rotation of the section; found {len(nodes)}"
             f"{' on a line' if len(nodes) > 2 else ''}; choose a face of the body"
@@ -142,7 +142,7 @@ def check_separate_nodes(model: ElasticModel, ports: list[Port]) -> None:
     for port in ports:
         for node in port.nodes if port.loaded else ():
             if owner.setdefault(int(node), port.name) != port.name:
-                raise model.refuse(
+                raise model.error(
                     f"ends.{port.name} and ends.{owner[int(node)]} share node {int(node)}, which "
                     "cannot follow two sections; choose separate nodes, or use one end for both"
                 )

@@ -99,18 +99,18 @@ class Sections:
         ]
         return np.concatenate([*motions, shapes[rest]])
 
-    def relieved(self, loads: Array, motions: Array) -> Array:
+    def relieve_inertia(self, loads: Array, motions: Array) -> Array:
         """Loads (w, k) with inertia relief: balanced by the inertia of rigid motions (w, f)."""
         inertia = self.mass @ motions
         return np.asarray(loads - inertia @ np.linalg.solve(motions.T @ inertia, motions.T @ loads))
 
-    def clamped(self, held: Sequence[Port]) -> Clamped:
+    def clamp(self, held: Sequence[Port]) -> Clamped:
         """Body with the sections of some ports fixed, factorised once per set of ports."""
         names = tuple(port.name for port in held)
-        return self._clamped.setdefault(names, Clamped(self, tuple(held)))
+        return self._clamped_cache.setdefault(names, Clamped(self, tuple(held)))
 
     @cached_property
-    def _clamped(self) -> dict[tuple[str, ...], Clamped]:
+    def _clamped_cache(self) -> dict[tuple[str, ...], Clamped]:
         return {}
 
 
@@ -126,13 +126,13 @@ class Clamped:
     """Static solutions of a body with fixed or prescribed sections."""
 
     sections: Sections
-    held: tuple[Port, ...]
+    held_ports: tuple[Port, ...]
 
     @cached_property
     def free(self) -> Integers:
         """Indices of the unknowns w except sections of held rigid ports."""
         stiff = [port for port in self.sections.ports if port.stiff]
-        fixed = [6 * stiff.index(port) + np.arange(6) for port in self.held if port.stiff]
+        fixed = [6 * stiff.index(port) + np.arange(6) for port in self.held_ports if port.stiff]
         return np.setdiff1d(np.arange(self.sections.expand.shape[1]), np.concatenate([*fixed, []]))
 
     @cached_property
@@ -140,7 +140,7 @@ class Clamped:
         """Constraint rows (6 m, free) of held ports of mean coupling; None without such ports."""
         from scipy import sparse
 
-        soft = [self.sections.rows[port.name] for port in self.held if not port.stiff]
+        soft = [self.sections.rows[port.name] for port in self.held_ports if not port.stiff]
         return sparse.vstack(soft).tocsc()[:, self.free] if soft else None
 
     @property
@@ -165,7 +165,7 @@ class Clamped:
         try:
             lu = splu(sparse.csc_array(matrix), permc_spec="MMD_AT_PLUS_A", **options)
         except RuntimeError:
-            raise self.sections.model.refuse(
+            raise self.sections.model.error(
                 "stiffness: expected a body that is stiff with a fixed end, found one that "
                 "moves without strain; look for a mechanism inside it"
             ) from None
@@ -197,7 +197,7 @@ class Clamped:
             section_motion = sections.rows[port.name].T.toarray()
             loads = -(sections.stiffness @ section_motion)[self.free]
             return section_motion + self.full(self.inverse(loads, None))
-        soft = [p.name for p in self.held if not p.stiff]
+        soft = [p.name for p in self.held_ports if not p.stiff]
         unit = np.zeros((6 * len(soft), 6))
         unit[6 * soft.index(port.name) :][:6] = np.eye(6)
         return self.full(self.inverse(np.zeros((len(self.free), 6)), unit))

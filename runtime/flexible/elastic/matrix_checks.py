@@ -18,7 +18,7 @@ RIGID = 1e-6
 DEFINITE = 1e-9
 #: Largest number of multiplications of a banded factorisation with reordered unknowns.  The actual
 #: factorisation needs a tenth of them, about half a minute.
-MOST_WORK = 5e11
+MAX_WORK = 5e11
 #: Smallest matrix entry, squared frequency and length; the largest is its inverse.
 _SMALLEST = 1e-60
 _RIGID_MOTIONS = ("translation along x", "translation along y", "translation along z",
@@ -56,7 +56,7 @@ def _check_sizes(model: ElasticModel) -> None:
     mass, stiffness = float(abs(model.mass).max()), float(abs(model.stiffness).max())
     sizes = (mass, stiffness, stiffness / mass, model.size)
     if not all(_SMALLEST < size < 1 / _SMALLEST for size in sizes):
-        raise model.refuse(
+        raise model.error(
             f"expected masses and stiffnesses of a real body, found up to {mass:.3g} kg and "
             f"{stiffness:.3g} N/m over {model.size:.3g} m, beyond the range of double precision; "
             "check the units (m, kg/m^3, N/m^2)"
@@ -68,13 +68,13 @@ def _symmetric_matrix(model: ElasticModel, key: str, matrix: Any) -> Any:
 
     difference, largest = abs(matrix - matrix.T), float(abs(matrix).max())
     if largest == 0.0:
-        raise model.refuse(f"{key}: expected a matrix of an elastic body, found only zeros")
+        raise model.error(f"{key}: expected a matrix of an elastic body, found only zeros")
     worst = float(difference.max())
     if worst > SYMMETRIC * largest:
         entries = difference.tocoo()
         entry = int(np.argmax(entries.data))
         i, j = int(entries.row[entry]), int(entries.col[entry])
-        raise model.refuse(
+        raise model.error(
             f"{key}: expected a symmetric matrix, found {matrix[i, j]:.6g} in row {i}, column {j} "
             f"and {matrix[j, i]:.6g} in row {j}, column {i} (counted from 0); if only one "
             "triangle is stored, add the other one"
@@ -88,7 +88,7 @@ def _check_connected(model: ElasticModel) -> None:
     pieces, labels = connected_components(_connectivity(model), directed=False)
     if pieces > 1:
         first = int(np.flatnonzero(labels != labels[0])[0])
-        raise model.refuse(
+        raise model.error(
             f"stiffness: expected one connected body, found {pieces} pieces (node {first}, counted "
             f"from 0, is not connected to node 0); connect them, or remove nodes without elements"
         )
@@ -115,10 +115,10 @@ def _check_work(model: ElasticModel) -> None:
     bandwidth = np.zeros(len(position))
     np.maximum.at(bandwidth, rows, np.maximum(rows - columns, 0).astype(float))
     work = model.unknowns**3 * float(np.sum(bandwidth**2))
-    if work > MOST_WORK:
-        raise model.refuse(
+    if work > MAX_WORK:
+        raise model.error(
             f"stiffness: expected a body whose {model.stiffness.shape[0]} unknowns can be solved "
-            f"for with {MOST_WORK:.0e} multiplications (half a minute), found {work:.1e}; use "
+            f"for with {MAX_WORK:.0e} multiplications (half a minute), found {work:.1e}; use "
             "fewer divisions or a coarser mesh (a slender or thin body may have many more unknowns "
             "than a compact one), or give the matrices of a reduced model in `matrices`"
         )
@@ -131,13 +131,13 @@ def _check_definite(model: ElasticModel, key: str, matrix: Any, unit: str) -> No
     diagonal = matrix.diagonal()
     row = int(np.argmin(diagonal))
     if diagonal[row] < 0:
-        raise model.refuse(
+        raise model.error(
             f"{key}: expected a positive semidefinite matrix, found {diagonal[row]:.6g} on the "
             f"diagonal in row {row} (counted from 0); check signs and the order of the unknowns"
         )
     negative = negative_pivots(matrix, DEFINITE)
     if negative:
-        raise model.refuse(
+        raise model.error(
             f"{key}: expected a positive semidefinite matrix ({unit}), found {negative} negative "
             f"eigenvalue{'s' if negative > 1 else ''}; check how it was assembled"
         )
@@ -162,7 +162,7 @@ def _check_equal_masses(model: ElasticModel) -> None:
     worst = float(np.max(np.abs(block - mass * np.eye(3))))
     if not mass > 0 or worst > RIGID * mass:
         values = ", ".join(f"{value:.6g}" for value in np.diag(block))
-        raise model.refuse(
+        raise model.error(
             f"mass: expected the same mass in kg along x, y and z, found {values}; check the order "
             'of the unknowns ("node" or "component") and that no unknown is missing'
         )
@@ -175,7 +175,7 @@ def _check_rigid_motions(model: ElasticModel) -> None:
     share = force / np.where(terms > 0, terms, 1.0)
     worst = int(np.argmax(share))
     if share[worst] > RIGID:
-        raise model.refuse(
+        raise model.error(
             f"stiffness: expected no force in rigid-body motions, found {share[worst]:.2g} of the "
             f"size of its terms in a {_RIGID_MOTIONS[worst]}: the model is constrained somewhere, "
             "or nodes and unknowns are in different orders; give the matrices of the free body"
@@ -186,7 +186,7 @@ def _check_scalar_mass(model: ElasticModel) -> None:
     if model.scalar_mass is None:
         return
     if model.unknowns == 6:
-        raise model.refuse(
+        raise model.error(
             "scalar_mass: expected 3 unknowns per node, found 6, with rotations that have other "
             "masses; leave it out"
         )
@@ -194,7 +194,7 @@ def _check_scalar_mass(model: ElasticModel) -> None:
     along_x = model.mass[0::3][:, 0::3]
     worst = float(abs(along_x - model.scalar_mass).max())
     if worst > RIGID * largest:
-        raise model.refuse(
+        raise model.error(
             f"scalar_mass: expected the mass matrix of the unknowns along x, found entries that "
             f"differ by {worst:.3g} of {largest:.3g} kg; leave it out, or check the order of the "
             "nodes"

@@ -26,7 +26,7 @@ SOLIDS = ("tetra", "tetra10", "hexahedron", "hexahedron27")
 #: Number of integration points per chunk.
 _CHUNK_POINTS = 20_000
 #: Largest number of entries of all element stiffness matrices: 4 GB, and about a minute.
-MOST_ENTRIES = 40_000_000
+MAX_ENTRIES = 40_000_000
 
 LOCKING = (
     "elements of degree 1 are too stiff in bending (by 30 % in frequency with two layers); "
@@ -133,7 +133,7 @@ def _has_midside_nodes(skfem: Any, mesh: Any) -> bool:
 def check_element_count(elements: int, hexahedra: bool, order: int, where: str) -> None:
     """Raise SceneError for meshes that would take minutes and many gigabytes to assemble."""
     entries = {(False, 1): 12, (False, 2): 30, (True, 1): 24, (True, 2): 81}[hexahedra, order] ** 2
-    max_count = MOST_ENTRIES // entries
+    max_count = MAX_ENTRIES // entries
     if elements > max_count:
         raise SceneError(
             f"{where}: expected {max_count} {'hexahedra' if hexahedra else 'tetrahedra'} of degree "

@@ -52,10 +52,10 @@ T = TypeVar("T")
 #: Number of vibration modes for modes = "auto".
 AUTO_MODES = 4
 #: Number of cached bodies.
-KEPT = 8
+MAX_CACHED_BODIES = 8
 #: Approximate number of unknowns from which a body is computed in a subprocess, which can be
 #: interrupted: some tenths of a second of factorisation.
-LONG = 6000
+SUBPROCESS_UNKNOWNS = 6000
 #: Entries below this share of the largest one are rounding, and are set to zero.
 _ROUNDING = 1e-10
 
@@ -82,7 +82,7 @@ def modal_body(elastic: Elastic, scene: Scene) -> ModalBody:
     body = _cached_body(source, held, loaded, motions, frame, reason)
     if elastic.frame != "auto" or frame == "mean" or _stays_definite(body, held, scene):
         return body
-    rotations, support = _port_rotations(body), Supports(scene).of(body.name)
+    rotations, support = _port_rotations(body), Supports(scene).support_of(body.name)
     fewer_suffice = is_definite_with_first_shape(body, held, support, rotations)
     natural_frame = frame if fewer_suffice else ""
     reason = "mean, because the mass matrix stays definite there"
@@ -92,7 +92,7 @@ def modal_body(elastic: Elastic, scene: Scene) -> ModalBody:
 
 
 def _stays_definite(body: ModalBody, held: str, scene: Scene) -> bool:
-    support = Supports(scene).of(body.name)
+    support = Supports(scene).support_of(body.name)
     return is_mass_definite(body, body.ports[held], support, _port_rotations(body))
 
 
@@ -118,7 +118,7 @@ class _ElasticSource:
         return hash(self._key)
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=MAX_CACHED_BODIES)
 def _cached_body(
     source: _ElasticSource,
     held: str,
@@ -137,7 +137,7 @@ def _cached_body(
 
 def _run_long_work(work: Callable[..., T], elastic: Elastic, *arguments: Any) -> T:
     """Return work(elastic, *arguments), computed in a subprocess if it may take long."""
-    if _estimated_unknowns(elastic) < LONG:
+    if _estimated_unknowns(elastic) < SUBPROCESS_UNKNOWNS:
         return work(elastic, *arguments)
     return run_in_subprocess(f'elastic "{elastic.name}"', work, elastic, *arguments)
 
@@ -183,7 +183,7 @@ FreeMotions = tuple[tuple[tuple[float, ...], bool], ...]
 def _free_motions(name: str, held: str, hinge: Hinge | None, scene: Scene) -> FreeMotions:
     """Free motions of the inboard hinge of a body; none if not known or changing."""
     released = {event.hinge for event in scene.event}
-    if hinge is None or hinge.lets_go or hinge.name in released:
+    if hinge is None or hinge.is_released or hinge.name in released:
         return ()
     is_loaded = held in _loaded_ends(name, scene, excluded=hinge)
     is_coupled = any(
@@ -241,11 +241,11 @@ def elastic_model(elastic: Elastic) -> ElasticModel:
     assert elastic.young is not None and elastic.density is not None
     material = Material(elastic.young, elastic.poisson or 0.0, elastic.density)
 
-    def look(outline: ElasticModel) -> None:
+    def check_ends(outline: ElasticModel) -> None:
         for name, end in elastic.ends.items():
             select_port(outline, name, end, False)
 
-    return check_matrices(mesh_model(mesh, material, elastic.order or 2, where, look))
+    return check_matrices(mesh_model(mesh, material, elastic.order or 2, where, check_ends))
 
 
 def _inboard_hinge(name: str, scene: Scene) -> Hinge | None:
@@ -279,9 +279,9 @@ def _frame_and_reason(elastic: Elastic, hinge: Hinge | None, held: str) -> tuple
 def prescribes_rotation(hinge: Hinge) -> bool:
     """Whether a hinge prescribes all rotations of its outboard end at all times."""
     if hinge.facts is not None and not hinge.facts.turns:
-        return not hinge.lets_go
+        return not hinge.is_released
     is_driven = hinge.drive is not None and all(entry is not None for entry in hinge.drive)
-    return is_driven and not hinge.lets_go
+    return is_driven and not hinge.is_released
 
 
 def elastic_body(
@@ -361,7 +361,7 @@ def _notes(model: ElasticModel, reduction: Reduction, stiffening: bool) -> list[
 
 def _port(reduction: Reduction, port_: Port, second: Array) -> ModalPort:
     motion = reduction.motion(port_)
-    if reduction.frame == "tangent" and port_ is reduction.held:
+    if reduction.frame == "tangent" and port_ is reduction.held_port:
         motion = np.zeros_like(motion)
     return ModalPort(
         position=port_.position, rotation=port_.rotation, phi=_clean(motion[:3]),
@@ -383,7 +383,7 @@ def _damping(
         return np.zeros_like(K)
     ratios = np.asarray(damping.ratio, dtype=float)
     if len(ratios) not in (1, len(K)):
-        raise model.refuse(
+        raise model.error(
             f"damping: expected one ratio, or one for each of {len(K)} shapes, found {len(ratios)}"
         )
     return np.asarray(damping.stiffness * K + np.diag(2 * ratios * frequencies * mass))
@@ -394,7 +394,7 @@ def _initial_state(model: ElasticModel, start: Any, key: str, n: int) -> Array:
     if values is None:
         return np.zeros(n)
     if len(values) != n:
-        raise model.refuse(
+        raise model.error(
             f"initial.{key}: expected {n} numbers, one per shape (static and fixed-interface), "
             f"found {len(values)}"
         )

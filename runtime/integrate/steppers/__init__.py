@@ -1,9 +1,10 @@
 """Time-integration methods by name.
 
 A new method is one file with a function `tableau() -> Tableau`: `Tableau` itself for an explicit
-Runge-Kutta method, a class of `implicit` for an implicit one.  Inside the package its module name
-is added to `BUILT_IN`; outside it, call `register(my_tableau())` before the run.  Nothing else
-changes: the C loop reads the coefficients at run time.
+Runge-Kutta method, a class of `implicit_methods` for an implicit one.  Inside the package its
+module name is added to `EXPLICIT` or to `methods.IMPLICIT`, and to the lists of its properties
+beside them; outside it, call `register(my_tableau())` before the run.  The C loop reads the
+coefficients at run time.  CONTRIBUTING.md lists the tests to extend.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from importlib import import_module
 
 from mstmm.errors import SceneError
 
+from ..methods import IMPLICIT, METHODS_WITH_RADIUS, TANGENTS
 from .implicit_methods import with_position_constraints
 from .tableau import Tableau, from_monomials, hermite, to_read_only
 
@@ -40,26 +42,14 @@ __all__ = [
 ]
 
 EXPLICIT = ("rk4", "dopri5", "dop853", "pirk13")
-IMPLICIT = (
-    "rodas4", "rodas4p2", "rodas5p", "ros34pw2", "rodas4pw", "esdirk436", "kvaerno5",
-    "genalpha", "dttmm", "hht", "newmark", "wilson", "houbolt", "exprb32",
-    "genalpha-index3", "hht-index3",
-)  # fmt: skip
 BUILT_IN = EXPLICIT + IMPLICIT
 
 #: Explicit methods, as messages list them.
 EXPLICIT_METHODS = f"{', '.join(EXPLICIT[:-1])} or {EXPLICIT[-1]}"
 
-#: Methods whose spectral radius at infinity a run may choose.
-METHODS_WITH_RADIUS = ("genalpha", "dttmm", "genalpha-index3")
-
 #: Suffix of methods that satisfy the position constraints of closed loops at the end of a step;
 #: the others satisfy those of accelerations and project the state after each step.
 INDEX3_SUFFIX = "-index3"
-
-#: Tangents of the equations of motion for implicit methods, in the order of the C loop's numbers:
-#: auto is the exact one for Rosenbrock methods; iterations first try that of inertia and laws.
-TANGENTS = ("auto", "exact", "laws")
 
 #: Rosenbrock methods whose order does not depend on the tangent, and methods that iterate.
 W_METHODS = ("ros34pw2", "rodas4pw")
@@ -131,10 +121,10 @@ def check_radius(name: str, radius: float | None) -> None:
 
 def check_size(tableau: Tableau, unknowns: int) -> None:
     """Raise SceneError if coordinates and speeds together exceed the limit of the method."""
-    if tableau.most_unknowns and unknowns > tableau.most_unknowns:
+    if tableau.max_unknowns and unknowns > tableau.max_unknowns:
         raise SceneError(
             f'method "{tableau.name}" computes the exponential of a matrix of all coordinates and '
-            f"speeds, at most {tableau.most_unknowns}; found {unknowns}: use rodas5p or, for "
+            f"speeds, at most {tableau.max_unknowns}; found {unknowns}: use rodas5p or, for "
             "undamped vibration, dop853, or fewer shapes of flexible bodies"
         )
 

@@ -62,7 +62,7 @@ class Implicit(Tableau):
         return math.inf
 
     @property
-    def inner(self) -> Array:
+    def inner_nodes(self) -> Array:
         """Inner nodes of a step at which the rates of integrals are evaluated."""
         order = 4 if self.order <= 4 else 6
         return to_read_only(_LOBATTO_NODES[order])
@@ -73,14 +73,14 @@ class Implicit(Tableau):
 
         The dense output is that of the integrals of these rates.
         """
-        nodes = [Fraction(0), *(Fraction(float(x)) for x in self.inner), Fraction(1)]
+        nodes = [Fraction(0), *(Fraction(float(x)) for x in self.inner_nodes), Fraction(1)]
         weights = integrals_in_basis(nodes)
         return to_read_only(np.pad(weights, ((0, 0), (0, self.n_dense - weights.shape[1]))))
 
     @property
     def roughness(self) -> Array:
         """Weights (n + 2,) of those rates in their highest divided difference; sum |w| = 1."""
-        nodes = np.array([0.0, *self.inner, 1.0])
+        nodes = np.array([0.0, *self.inner_nodes, 1.0])
         weights = divided_difference(nodes.tolist())
         return to_read_only(np.array(weights) / np.abs(weights).sum())
 
@@ -219,7 +219,7 @@ class DiagonallyImplicit(Implicit):
     kind: ClassVar[int] = DIRK
 
     @property
-    def inner(self) -> Array:
+    def inner_nodes(self) -> Array:
         """No inner nodes: the stages also integrate the other rates."""
         return to_read_only(np.zeros(0))
 
@@ -335,16 +335,16 @@ class NewmarkFamily(Implicit):
         factor = (1.0 - self.alpha_f) / (1.0 - self.alpha_m)
         known_part = (self.alpha_f * rate - self.alpha_m * a) / (1.0 - self.alpha_m)
 
-        def moved(h: float, new: Array) -> tuple[Array, Array]:
+        def advance(h: float, new: Array) -> tuple[Array, Array]:
             acceleration = known_part + factor * new
             q_new = q + h * u + h * h * ((0.5 - self.beta_n) * a + self.beta_n * acceleration)
             return q_new, u + h * ((1.0 - self.gamma_n) * a + self.gamma_n * acceleration)
 
-        free_motion = moved(h, np.zeros(4))
+        free_motion = advance(h, np.zeros(4))
         divisor = 1.0 + factor * (c * h * self.gamma_n + k * h * h * self.beta_n)
         new = -(c * free_motion[1] + k * free_motion[0]) / divisor
         new = rate + (new - rate) / self.collocation
-        return np.array([*moved(1.0, new), new, known_part + factor * new])
+        return np.array([*advance(1.0, new), new, known_part + factor * new])
 
 
 def _houbolt_step_matrix(k: float, c: float) -> Array:
@@ -386,8 +386,8 @@ class Exponential(Implicit):
     kind: ClassVar[int] = EXPONENTIAL
 
     def _check_consistency(self) -> None:
-        if not self.most_unknowns > 0:
-            raise ValueError(f"tableau {self.name}: most_unknowns must be positive")
+        if not self.max_unknowns > 0:
+            raise ValueError(f"tableau {self.name}: max_unknowns must be positive")
 
     def amplification(self, z: ArrayLike) -> NDArray[np.complex128]:
         """R(z) = exp(z) of one step on y' = lambda y with z = h lambda: exact."""
@@ -411,5 +411,5 @@ def make_exponential(
         dense=hermite([0.0, 1.0, 0.0]),
         dense_order=order,
         second=to_read_only(np.zeros((3, 3))),
-        most_unknowns=most,
+        max_unknowns=most,
     )

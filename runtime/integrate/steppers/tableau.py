@@ -68,7 +68,7 @@ class Tableau:
         iterated: (nodes, iterations) of a method whose stages after the first form so many blocks;
             each depends only on the previous block (the first on k_0) with the same weights: the
             stages of a block are evaluated together.  None for other methods.
-        most_unknowns: maximum number of coordinates and speeds together, 0 for no limit.
+        max_unknowns: maximum number of coordinates and speeds together, 0 for no limit.
         source: publication of the coefficients.
 
     Raises:
@@ -89,7 +89,7 @@ class Tableau:
     C_extra: Array = field(default_factory=lambda: to_read_only(np.zeros(0)))
     beta: float = 0.0
     iterated: tuple[int, int] | None = None
-    most_unknowns: int = 0
+    max_unknowns: int = 0
     source: str = ""
 
     def __post_init__(self) -> None:
@@ -107,7 +107,9 @@ class Tableau:
             if array.shape != shape:
                 raise ValueError(f"tableau {self.name}: {label} is {array.shape}, expected {shape}")
             if array.flags.writeable or not array.flags.c_contiguous:
-                raise ValueError(f"tableau {self.name}: {label} must come from frozen()")
+                raise ValueError(
+                    f"tableau {self.name}: {label} must be read-only; use to_read_only"
+                )
         self._check_consistency()
 
     def _check_consistency(self) -> None:
@@ -138,7 +140,7 @@ class Tableau:
         return self.A[1 + nodes : 1 + 2 * nodes, 1 : 1 + nodes]
 
     @property
-    def mix(self) -> Array:
+    def block_weights(self) -> Array:
         """Weights (nodes, 8) of an iterated method's blocks, transposed for eight lanes."""
         nodes = self.iterated[0] if self.iterated else 0
         mix = np.zeros((nodes, MAX_LANES))
@@ -146,7 +148,7 @@ class Tableau:
         return mix
 
     @property
-    def read_blocks(self) -> list[int]:
+    def shared_blocks(self) -> list[int]:
         """1 for every block of an iterated method that more than the next block reads, else 0."""
         nodes, iterations = self.iterated or (1, 0)
         reading_rows = [self.B, np.abs(self.dense).sum(axis=1), np.abs(self.A_extra).sum(axis=0)]

@@ -20,29 +20,29 @@ def is_requested(damping: Losses | Ratios) -> bool:
     return not (isinstance(damping, int | float) and damping == 0)
 
 
-def refuse_in_motion(linear: LinearEquations, structural: Losses, modal: Ratios) -> None:
+def check_state_at_rest(linear: LinearEquations, structural: Losses, modal: Ratios) -> None:
     """Raise SceneError for structural or modal damping about a moving state."""
     if linear.state.u.any() and (is_requested(structural) or is_requested(modal)):
         raise SceneError(
-            "frequency response: structural and modal damping are those of a scene at rest, and "
-            "this state moves; leave them out, or damp laws and shapes"
+            "frequency response: structural and modal damping require a state at rest, found a "
+            "moving one; leave them out, or define damping in laws and flexible bodies"
         )
 
 
-def refuse_ratios(modal: Ratios) -> None:
+def reject_modal_damping(modal: Ratios) -> None:
     """Raise SceneError for modal damping ratios together with exact beams."""
     if is_requested(modal):
         raise SceneError(
-            "modal: ratios are those of natural motions by shapes, which exact beams do not have; "
-            "give structural, or leave the shapes"
+            "modal: damping ratios refer to normal modes with shape functions, which exact beams "
+            "do not have; give structural, or leave exact out"
         )
 
 
-def refuse_drives(pushes: Sequence[Channel], changed: bool) -> None:
+def reject_drives(pushes: Sequence[Channel], changed: bool) -> None:
     """Raise SceneError for drive motions if stiffness or inertia is `changed` from M, C, K."""
-    moved = next((one.name for one in pushes if one.moves), "")
+    moved = next((channel.name for channel in pushes if channel.drive_factors), "")
     if changed and moved:
         raise SceneError(
-            f'"{moved}": motions of drives do not go with structural damping and exact beams; '
-            "leave these out, or push by an acceleration of the ground"
+            f'"{moved}": motions of drives cannot be combined with structural damping or exact '
+            "beams; leave these out, or use an acceleration of the ground"
         )

@@ -20,11 +20,11 @@ import numpy as np
 
 from mstmm.array_validation import Array, Integers, integer
 from mstmm.errors import NumericalFailure, SceneError
-from mstmm.risk import AssessedAnswer, DeferredRisks, Risk
+from mstmm.risk import AssessedResult, DeferredRisks, Risk
 
 from ...engine.harmonic_response import HarmonicResponse
 from ..modes import CHANNEL_RISKS
-from .exact_beams import Chosen, ExactBeams, exact_beams
+from .exact_beams import BeamSelection, ExactBeams, exact_beams
 
 if TYPE_CHECKING:
     from ..linear_equations import LinearEquations
@@ -44,7 +44,7 @@ _SYMMETRIC = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class DynamicStiffnessModes(AssessedAnswer):
+class DynamicStiffnessModes(AssessedResult):
     """The k slowest undamped normal modes of a scene with exact beams, by rising omega.
 
     Attributes:
@@ -52,14 +52,14 @@ class DynamicStiffnessModes(AssessedAnswer):
         coordinates: n names; for an exact beam, the deflection and the slope times length of its
             far end relative to the tangent at the near end.
         shapes: (n, k) mode shapes, the largest entry of each 1.
-        complete: always True: no mode below the last one is missing.
+        is_complete: always True: no mode below the last one is missing.
         findings: risks of the linear model.
     """
 
     omega: Array
     coordinates: tuple[str, ...] = field(repr=False)
     shapes: Array = field(repr=False)
-    complete: bool = True
+    is_complete: bool = True
     findings: Iterable[Risk] = field(default=(), repr=False)
 
     def __len__(self) -> int:
@@ -75,20 +75,24 @@ class DynamicStiffnessModes(AssessedAnswer):
         return {
             "omega": self.omega.tolist(), "frequency": self.frequency.tolist(),
             "coordinates": list(self.coordinates), "shapes": self.shapes.tolist(),
-            "complete": self.complete, **self.assessment(),
+            "complete": self.is_complete, **self.assessment(),
         }  # fmt: skip
 
 
-def exact_modes(linear: LinearEquations, count: int, chosen: Chosen) -> DynamicStiffnessModes:
+def exact_modes(
+    linear: LinearEquations, count: int, chosen: BeamSelection
+) -> DynamicStiffnessModes:
     """Normal modes with exact beams; see `Linear.exact_modes`."""
-    count = integer("count", count, 1, "a number of motions, 1 or more")
-    beams = exact_beams(linear, chosen, 0.0).undamped()
+    count = integer("count", count, 1, "a number of modes, 1 or more")
+    beams = exact_beams(linear, chosen, 0.0).without_damping()
     counter = _Counter(beams)
-    omega = counter.bisected(count)
-    others = ("shapes", *CHANNEL_RISKS)
-    shapeless = DeferredRisks(lambda: (risk for risk in linear.risks if risk.name not in others))
+    omega = counter.natural_frequencies(count)
+    excluded_risks = ("shapes", *CHANNEL_RISKS)
+    shapeless = DeferredRisks(
+        lambda: (risk for risk in linear.risks if risk.name not in excluded_risks)
+    )
     return DynamicStiffnessModes(
-        omega, beams.linear.coordinates, counter.shapes(omega), findings=shapeless
+        omega, beams.linear.coordinate_names, counter.shapes(omega), findings=shapeless
     )
 
 
@@ -98,64 +102,64 @@ class _Counter:
     def __init__(self, beams: ExactBeams) -> None:
         linear = beams.linear
         engine, state = linear.model.looped, linear.state
-        self.beams, self.free = beams, list(linear.free)
+        self.beams, self.free = beams, list(linear.free_speed_indices)
         self.response = HarmonicResponse(
-            engine, state.t, state.q, state.u, state.a, exact=beams.bodies
+            engine, state.t, state.q, state.u, state.udot, exact=beams.bodies
         )  # fmt: skip
-        if self.response.tangent.coupled:
+        if self.response.tangent.off_tree_count:
             raise SceneError(
-                "exact modes: springs between bodies or loads that follow others reach across the "
-                "tree, where motions are not counted; take them out"
+                "exact modes: springs between bodies and loads that follow other bodies couple "
+                "branches of the tree, for which modes cannot be counted; remove them"
             )
-        if linear.pencil.skew() > _SYMMETRIC:
+        if linear.operators.skew() > _SYMMETRIC:
             raise SceneError(
-                "exact modes: loads follow the scene, so that its motions are not those of a "
-                "potential and cannot be counted; take them out, or ask for modes of shapes"
+                "exact modes: follower loads have no potential, so that modes cannot be counted; "
+                "remove these loads, or use modes with shape functions"
             )
-        self.response.undamped()
+        self.response.omit_damping()
         self.unit = beams.slowest
         size = sum(beam.size**2 for beam in beams.beams) + engine.nu
-        self.most = max(4, _BATCH // max(1, size))
+        self.max_batch = max(4, _BATCH // max(1, size))
 
     def below(self, omega: Array) -> Integers:
         """Mode count J (k,) below omega (k,), rad/s."""
-        parts = [omega[k : k + self.most] for k in range(0, len(omega), self.most)]
-        return np.concatenate([self._counted(part) for part in parts])
+        parts = [omega[k : k + self.max_batch] for k in range(0, len(omega), self.max_batch)]
+        return np.concatenate([self._count_modes(part) for part in parts])
 
-    def _counted(self, omega: Array) -> Integers:
+    def _count_modes(self, omega: Array) -> Integers:
         for beside in (*_BESIDE, 0.0):
-            found = self.response.count_negative(-(omega**2))
-            if (found >= 0).all():
-                return found + self.beams.clamped(omega)
-            omega = np.where(found < 0, omega * (1 + beside), omega)
-        raise NumericalFailure(f"exact modes: near {omega[found < 0][0]:.9g} rad/s pivots vanish")
+            counts = self.response.count_negative(-(omega**2))
+            if (counts >= 0).all():
+                return counts + self.beams.clamped_mode_count(omega)
+            omega = np.where(counts < 0, omega * (1 + beside), omega)
+        raise NumericalFailure(
+            f"exact modes: singular factors near {omega[counts < 0][0]:.9g} rad/s"
+        )
 
-    def bisected(self, count: int) -> Array:
+    def natural_frequencies(self, count: int) -> Array:
         """Natural frequencies omega (count,) of the slowest modes, rad/s."""
         low = _SLOWEST * self.unit
         if (self.response.count_negative(np.array([low**2])) > 0).any():
-            raise SceneError(
-                "exact modes: near this state a motion grows; ask about a state that is stable"
-            )
+            raise SceneError("exact modes: this state is unstable; use a stable state")
         high = self.unit
         while self.below(np.array([high]))[0] < count:
             high *= 2
             if high > _FASTEST * self.unit:
                 raise SceneError(
                     f"count = {count}: the scene has no more than "
-                    f"{self.below(np.array([high]))[0]} natural motions; ask for fewer"
+                    f"{self.below(np.array([high]))[0]} modes; request fewer"
                 )
-        wanted = np.arange(1, count + 1)
+        mode_numbers = np.arange(1, count + 1)
         lower, upper = np.full(count, low), np.full(count, high)
         still = self.below(np.array([low]))[0]
         while (upper - lower > _CLOSE * upper).any():
             middle, which = np.unique((lower + upper) / 2, return_inverse=True)
-            reached = self.below(middle)[which] >= wanted
+            reached = self.below(middle)[which] >= mode_numbers
             lower, upper = (
                 np.where(reached, lower, middle[which]),
                 np.where(reached, middle[which], upper),
             )
-        return np.where(wanted <= still, 0.0, (lower + upper) / 2)
+        return np.where(mode_numbers <= still, 0.0, (lower + upper) / 2)
 
     def shapes(self, omega: Array) -> Array:
         """Mode shapes (n, k): responses next to each frequency, one for each multiplicity."""
@@ -165,11 +169,11 @@ class _Counter:
         columns = np.zeros((most, self.response.engine.nu))
         columns[:, self.free] = np.random.default_rng(0).standard_normal((most, len(self.free)))
         answers, _, _ = self.response.amplitudes(near.astype(np.complex128) * 1j, columns)
-        found = [np.linalg.qr(answer[: last - first, self.free].real.T)[0]
+        vectors = [np.linalg.qr(answer[: last - first, self.free].real.T)[0]
                  for answer, (first, last) in zip(answers, runs, strict=True)]  # fmt: skip
-        shapes = np.concatenate(found, axis=1)
-        places = np.abs(shapes).argmax(axis=0)
-        return np.asarray(shapes / shapes[places, np.arange(len(omega))])
+        shapes = np.concatenate(vectors, axis=1)
+        largest_rows = np.abs(shapes).argmax(axis=0)
+        return np.asarray(shapes / shapes[largest_rows, np.arange(len(omega))])
 
 
 def _runs(omega: Array) -> list[tuple[int, int]]:

@@ -22,8 +22,8 @@ class Amplitudes:
     """
 
     def __init__(self, places: Sequence[int], whole: Matrices, lossy: Matrices | None) -> None:
-        self._places, self._whole = list(places), whole
-        self._lost = 0.0 if lossy is None else 1j * (lossy.K - whole.K)
+        self._indices, self._matrices = list(places), whole
+        self._loss_stiffness = 0.0 if lossy is None else 1j * (lossy.K - whole.K)
 
     def amplitudes(self, s: Complex, columns: Array) -> tuple[Complex, Array, NDArray[np.int32]]:
         """Amplitudes x (k, n, nu) at s (k,) for n right-hand sides (n, nu).
@@ -31,13 +31,13 @@ class Amplitudes:
         Also returns the condition number (k,) of Z and the body index -1 (k,): no body.
         """
         x = np.zeros((len(s), *columns.shape), dtype=np.complex128)
-        growth, whole = np.zeros(len(s)), self._whole
+        growth, whole = np.zeros(len(s)), self._matrices
         for k, at in enumerate(s):
-            parts = at**2 * whole.M, at * whole.C, whole.K + self._lost
+            parts = at**2 * whole.M, at * whole.C, whole.K + self._loss_stiffness
             z = np.asarray(sum(parts))
             growth[k] = _condition(z, np.asarray(sum(map(np.abs, parts))))
             if np.isfinite(growth[k]):
-                x[k][:, self._places] = np.linalg.solve(z, columns[:, self._places].T).T
+                x[k][:, self._indices] = np.linalg.solve(z, columns[:, self._indices].T).T
         return x, growth, np.full(len(s), -1, dtype=np.int32)
 
 

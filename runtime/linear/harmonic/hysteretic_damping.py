@@ -23,7 +23,7 @@ from ...packing.scene_packing import packed_system
 from ...packing.system import Arrays, BodyNumbers, BodyRun, ForceNumbers, LawNumbers
 from ..frozen_loads import bushing_deflection, spring_length
 from ..mck_matrices import State
-from ..operating_point.friction import changed_laws
+from ..operating_point.friction import change_laws
 
 if TYPE_CHECKING:
     from ...engine.compiled_scene import CompiledScene
@@ -47,23 +47,23 @@ def stiffer(linear: LinearEquations, losses: Losses) -> LoopedEngine:
 
     Raises SceneError for a name without stiffness and for a negative loss factor.
     """
-    model, engine, state = linear.model, linear.tree, linear.state
-    system, lossy = engine.packed.system, by_name(model, losses)
+    model, engine, state = linear.model, linear.open_tree, linear.state
+    system, lossy = engine.packed.system, loss_factor_lookup(model, losses)
     bodies = tuple(_stiffer_shapes(model, run, lossy) for run in system.bodies)
 
     def stiff(law: LawNumbers, body: int) -> LawNumbers:
         return _stiffer_law(law, lossy(engine.hinge_name(body)))
 
-    laws = tuple(law for run in system.laws for law in changed_laws(run, stiff))
+    laws = tuple(law for run in system.laws for law in change_laws(run, stiff))
     forces = tuple(
-        _stiffer_force(engine, force, state, lossy(one.name))
-        for force, one in zip(system.forces, engine.packed.scene.forces, strict=True)
+        _stiffer_force(engine, force, state, lossy(element.name))
+        for force, element in zip(system.forces, engine.packed.scene.forces, strict=True)
     )
-    made = replace(system, bodies=bodies, laws=laws, forces=forces)
-    return LoopedEngine(packed_system(made, engine.packed))
+    stiffer_system = replace(system, bodies=bodies, laws=laws, forces=forces)
+    return LoopedEngine(packed_system(stiffer_system, engine.packed))
 
 
-def by_name(model: CompiledScene, losses: Losses) -> Callable[[str], float]:
+def loss_factor_lookup(model: CompiledScene, losses: Losses) -> Callable[[str], float]:
     """Function from element name to loss factor; chain members have that of their chain."""
     if not isinstance(losses, Mapping):
         factor = _factor("structural", losses)
@@ -88,35 +88,35 @@ def _factor(what: str, value: float) -> float:
 
 def _elastic(model: CompiledScene) -> Iterator[str]:
     """Names of elements that may have a loss factor."""
-    packed = model.packed
-    yield from model.layout.modal
-    yield from (one.name for one in packed.scene.forces)
+    packed = model.packed_scene
+    yield from model.coordinate_layout.modal
+    yield from (force.name for force in packed.scene.forces)
     for run in packed.system.laws:
-        for _, body, _, _ in run.each():
+        for _, body, _, _ in run.iterate_laws():
             name = model.looped.hinge_name(body)
             yield name
             yield name.partition("[")[0]
 
 
 def _stiffer_shapes(model: CompiledScene, run: BodyRun, lossy: Callable[[str], float]) -> BodyRun:
-    names = {slots.q: name for name, slots in model.layout.modal.items()}
+    names = {slots.q: name for name, slots in model.coordinate_layout.modal.items()}
 
-    def one(body: BodyNumbers) -> BodyNumbers:
+    def stiffen_body(body: BodyNumbers) -> BodyNumbers:
         if body.modal is None:
             return body
         matrices = dict(body.modal.matrices.named)
         matrices["stiffness"] = matrices["stiffness"] * (1 + lossy(names[body.modal.q]))
         return replace(body, modal=replace(body.modal, matrices=Arrays(matrices)))
 
-    if all(body.modal is None for body in run.alike):
+    if all(body.modal is None for body in run.members):
         return run
-    return replace(run, alike=tuple(map(one, run.alike)))
+    return replace(run, members=tuple(map(stiffen_body, run.members)))
 
 
 def _stiffer_law(law: LawNumbers, factor: float) -> LawNumbers:
     p = list(law.p)
-    for place in _STIFF[law.kernel]:
-        p[place] *= 1 + factor
+    for index in _STIFF[law.kernel]:
+        p[index] *= 1 + factor
     return replace(law, p=tuple(p))
 
 

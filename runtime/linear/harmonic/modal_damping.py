@@ -62,25 +62,26 @@ def modal_damping(linear: LinearEquations, ratios: Ratios) -> ModalDamping:
     zeta = one_row("modal", [ratios] if alone else ratios)
     if (zeta < 0).any():
         raise SceneError(
-            f"modal = {zeta.min():g}: expected parts of the critical damping, 0 or more, such as "
-            "0.02"
+            f"modal = {zeta.min():g}: expected damping ratios of 0 or more, such as 0.02"
         )
     if len(zeta) > len(linear):
         raise SceneError(
-            f"modal: {len(zeta)} ratios, but the scene has {len(linear)} natural motions; give one "
+            f"modal: {len(zeta)} ratios, but the scene has {len(linear)} modes; give one "
             "number for all, or fewer"
         )
     if alone:
-        check_dense_size(len(linear), "the matrix of all motions")
-    found = modes(linear, None if alone else len(zeta), False)
-    if not found.undamped or found.growing.any():
+        check_dense_size(len(linear), "the matrix of all modes")
+    undamped_modes = modes(linear, None if alone else len(zeta), False)
+    if not undamped_modes.is_undamped or undamped_modes.unstable.any():
         raise SceneError(
-            "modal: near this state a motion grows, or loads follow the scene, so that its motions "
-            "are no vibrations to damp; damp laws, or give structural"
+            "modal: damping ratios require undamped vibration modes, but this state is unstable or "
+            "has follower loads; define damping in laws, or give structural"
         )
-    rates = 2 * zeta * found.omega
+    rates = 2 * zeta * undamped_modes.omega
     damped = np.flatnonzero(rates)
-    if linear.mechanism is not None:  # the mass matrix of the sweep is that of the spanning tree
-        return ModalDamping(linear.M @ found.shapes[:, damped], rates[damped])
-    mass = [linear.pencil.mass(found.shapes[:, k]) for k in damped]
+    if (
+        linear.constrained_motion is not None
+    ):  # the mass matrix of the sweep is that of the spanning tree
+        return ModalDamping(linear.M @ undamped_modes.shapes[:, damped], rates[damped])
+    mass = [linear.operators.mass(undamped_modes.shapes[:, k]) for k in damped]
     return ModalDamping(np.array(mass).reshape(len(damped), len(linear)).T, rates[damped])

@@ -52,17 +52,17 @@ def find_peaks(
     def magnitudes(omega: Array) -> Array:
         return answer(omega).magnitude.reshape(len(omega), -1)[:, :count]
 
-    more = _beside(centre[held], ratio[held], low, high)
+    more = _frequencies_near_modes(centre[held], ratio[held], low, high)
     values = grid.magnitude.reshape(len(grid.omega), -1)[:, :count]
-    found = _refined(magnitudes, grid.omega, values, more)
+    peaks = _refine_peaks(magnitudes, grid.omega, values, more)
     for omega in centre[held & (ratio <= _UNDAMPED)]:
         near = magnitudes(omega * (1 + _NEAR * np.array([1.0, 2.0])))
         unbounded = near[0] > _POLE * near[1]
-        found.magnitude[unbounded], found.omega[unbounded] = np.inf, omega
-    return found
+        peaks.magnitude[unbounded], peaks.omega[unbounded] = np.inf, omega
+    return peaks
 
 
-def _beside(centre: Array, ratio: Array, low: float, high: float) -> Array:
+def _frequencies_near_modes(centre: Array, ratio: Array, low: float, high: float) -> Array:
     """Frequencies within (low, high), rad/s, at and about those of damped modes."""
     parts = [sign * x for sign in (1, -1) for x in _BESIDE]
     widths = [sign * x for sign in (1, -1) for x in _WITHIN]
@@ -73,7 +73,7 @@ def _beside(centre: Array, ratio: Array, low: float, high: float) -> Array:
     return every[(every > low) & (every < high)]
 
 
-def _refined(
+def _refine_peaks(
     magnitudes: Callable[[Array], Array], omega: Array, values: Array, more: Array
 ) -> Peaks:
     """Peaks of `values` (m, k) at omega (m,) and of the responses at `more` frequencies.

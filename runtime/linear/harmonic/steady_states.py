@@ -18,7 +18,7 @@ from mstmm.safe_text import abbreviate_names
 from ..input_channels import Channel
 from ..operating_point.changes import MATRICES, find_changes
 from ..operating_point.departure import find_departure
-from ..operating_point.later import LaterStates
+from ..operating_point.later_states import LaterStates
 from ..outputs.output_rows import LinearQuantity
 from ..validity import changing_risk
 
@@ -26,16 +26,16 @@ if TYPE_CHECKING:
     from ..linear_equations import LinearEquations
 
 
-def refuse_turning(linear: LinearEquations) -> None:
+def reject_rotating_balls(linear: LinearEquations) -> None:
     """Raise SceneError for exact beams about a state with rotating balls: no matrices exist."""
-    if linear.turning is not None:
+    if linear.rate_matrix is not None:
         raise SceneError(
-            "exact: the state turns a ball, a free or another hinge whose rates go by its "
-            "coordinates; ask about a state at rest, or leave beams their shapes"
+            "exact: a ball, free or similar hinge rotates at this state, so that its rates depend "
+            "on its coordinates; use a state at rest, or shape functions"
         )
 
 
-def refuse_unsteady(
+def check_steady(
     linear: LinearEquations, pushes: Sequence[Channel], shown: Sequence[LinearQuantity]
 ) -> None:
     """Raise SceneError where matrices, inputs or outputs change along the motion."""
@@ -43,18 +43,17 @@ def refuse_unsteady(
     if not linear.state.u.any() and not later.driven:
         return
     changing = find_changes(linear, later, pushes, shown)
-    if linear.turning is not None and (leaving := find_departure(linear)) is not None:
+    if linear.rate_matrix is not None and (leaving := find_departure(linear)) is not None:
         changing += leaving.coordinates
     if changing:
         raise SceneError(
-            "frequency response: the state moves, and along its motion changes "
-            f"{abbreviate_names(changing)}, so that other frequencies answer too; push by "
-            "efforts of hinges and read their coordinates and speeds, in axes that turn along, "
-            "or ask about a state at rest"
+            "frequency response: not constant along the motion of this state: "
+            f"{abbreviate_names(changing)}, so that the response contains other frequencies; use "
+            "efforts, coordinates and speeds of hinges, in rotating axes, or a state at rest"
         )
 
 
-def refuse_turning_outputs(linear: LinearEquations, shown: Sequence[LinearQuantity]) -> None:
+def check_steady_outputs(linear: LinearEquations, shown: Sequence[LinearQuantity]) -> None:
     """Raise SceneError for outputs that change along an otherwise steady motion.
 
     Unsteady motions are reported by the risks of the linear model instead.
@@ -65,9 +64,8 @@ def refuse_turning_outputs(linear: LinearEquations, shown: Sequence[LinearQuanti
     changing = find_changes(linear, later, (), shown)
     if changing and MATRICES not in changing and find_departure(linear, later) is None:
         raise SceneError(
-            f"outputs: the state moves, and {abbreviate_names(changing)} changes along its "
-            f"motion, so "
-            "that no constant matrix gives it; read coordinates and speeds of hinges"
+            f"outputs: no constant matrix gives {abbreviate_names(changing)}, because it changes "
+            "along the motion of this state; use coordinates and speeds of hinges"
         )
 
 

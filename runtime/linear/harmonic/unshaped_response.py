@@ -52,16 +52,16 @@ def unshaped_response_risks(
     """Risks of beam directions without shapes that change the response at omega (k,), rad/s."""
     lacking = {
         name: directions
-        for name, body in linear.model.flexible.items()
+        for name, body in linear.model.flexible_bodies.items()
         if (directions := [d for d in unshaped_directions(body) if d != "axial"])
     }
-    if not lacking or linear.carrying is not None:
+    if not lacking or linear.frame_transform is not None:
         return
     picked = np.unique(np.linspace(0, len(omega) - 1, _FREQUENCIES).astype(int))
     try:
         fuller = _with_shapes(linear, inputs, lacking)
         given, _ = response(linear, inputs, omega[picked])
-        expected, rounding = response(fuller, fuller.controls, omega[picked])
+        expected, rounding = response(fuller, fuller.input_channels, omega[picked])
     except MstmmError as failure:  # undamped resonance, or the scene rejects the added shapes
         yield information(
             "unexamined", "the response",
@@ -74,10 +74,10 @@ def unshaped_response_risks(
     share = np.divide(change, size, out=np.zeros_like(size), where=change > rounding)
     if (worst := float(share.max())) > _CHANGE:
         name, directions = next(iter(lacking.items()))
-        others = f" (and {len(lacking) - 1} more beams)" if len(lacking) > 1 else ""
+        more_beams_text = f" (and {len(lacking) - 1} more beams)" if len(lacking) > 1 else ""
         yield Risk(
             "shapes", f'"{name}"',
-            f'"{name}"{others} has no shapes of {" and ".join(directions)}: with them the '
+            f'"{name}"{more_beams_text} has no shapes of {" and ".join(directions)}: with them the '
             f"response changes by {worst:.0%}",
             f"add {', '.join(f'{d} = {_SHAPES}' for d in directions)} to its modes",
             worst, _CHANGE,
@@ -92,28 +92,33 @@ def _with_shapes(
     data = scene_data(model.scene)
     for beam in data["beam"]:
         if beam["name"] in lacking:
-            body = model.flexible[beam["name"]]
+            body = model.flexible_bodies[beam["name"]]
             for key in ("initial", "shapes"):
                 beam.pop(key, None)
             counts = Counter(mode.rstrip("0123456789") for mode in body.modes)
             beam["modes"] = {**counts, **dict.fromkeys(lacking[beam["name"]], _SHAPES)}
             beam["frame"] = body.frame
-    made = type(model)(scene_from_data(data, model.scene), model.known)
-    assert isinstance(made, Linearisable)
+    shaped_model = type(model)(scene_from_data(data, model.scene), model.known)
+    assert isinstance(shaped_model, Linearisable)
     amplitudes = None if linear.dry is None else linear.dry.amplitudes
-    return made.linearize(
-        _by_mode(state.q, "q_slice", model, made), _by_mode(state.u, "u_slice", model, made),
-        state.t, inputs=[one.name for one in inputs], friction=amplitudes,
+    return shaped_model.linearize(
+        _reorder_modes(state.q, "q_slice", model, shaped_model),
+        _reorder_modes(state.u, "u_slice", model, shaped_model), state.t,
+        inputs=[channel.name for channel in inputs], friction=amplitudes,
     )  # fmt: skip
 
 
-def _by_mode(values: Array, part: str, model: CompiledScene, made: CompiledScene) -> Array:
-    """Coordinates or speeds of `model` in the order of `made`, zero for added shape functions."""
-    slices = [getattr(slots, part) for slots in model.layout.modal.values()]
-    hinges = min(one.start for one in slices)
+def _reorder_modes(
+    values: Array, part: str, model: CompiledScene, shaped_model: CompiledScene
+) -> Array:
+    """Coordinates or speeds of `model` in the order of `shaped_model`, zero for added shapes."""
+    slices = [getattr(slots, part) for slots in model.coordinate_layout.modal.values()]
+    hinges = min(part_slice.start for part_slice in slices)
     pieces = [values[:hinges]]
-    for name in made.layout.modal:
-        own = values[getattr(model.layout.modal[name], part)]
-        modes = dict(zip(model.flexible[name].modes, own, strict=True))
-        pieces.append(np.array([modes.get(mode, 0.0) for mode in made.flexible[name].modes]))
+    for name in shaped_model.coordinate_layout.modal:
+        own = values[getattr(model.coordinate_layout.modal[name], part)]
+        modes = dict(zip(model.flexible_bodies[name].modes, own, strict=True))
+        pieces.append(
+            np.array([modes.get(mode, 0.0) for mode in shaped_model.flexible_bodies[name].modes])
+        )
     return np.concatenate(pieces)

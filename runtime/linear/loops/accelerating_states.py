@@ -32,41 +32,49 @@ class Motion:
 
     Attributes:
         swept: (nu, n) S, change of all speeds for a unit of each x at the same v.
-        going, placed: (n, n) derivatives of the independent accelerations by v and by x.
-        bent, shifted: (nu, n) B and T, dependent parts of the derivatives of all accelerations.
-        turning: (n, n) G_x, 1/s; None where x are integrals of v.
+        speed_derivatives, position_derivatives: (n, n) derivatives of the independent accelerations
+            by v and by x.
+        dependent_speed_part, dependent_position_part: (nu, n) B and T, dependent parts of the
+            derivatives of all accelerations.
+        rate_matrix: (n, n) G_x, 1/s; None where x are integrals of v.
     """
 
     swept: Array
-    going: Array
-    placed: Array
-    bent: Array
-    shifted: Array
-    turning: Array | None
+    speed_derivatives: Array
+    position_derivatives: Array
+    dependent_speed_part: Array
+    dependent_position_part: Array
+    rate_matrix: Array | None
 
     @classmethod
-    def of(cls, slopes: Mapping[str, Array], places: Sequence[int], ways: Array) -> Motion:
+    def from_derivatives(
+        cls, slopes: Mapping[str, Array], speed_indices: Sequence[int], motion_basis: Array
+    ) -> Motion:
         """Build from derivatives (nu, nu) of accelerations that keep the loops closed.
 
-        `slopes` has the names of `Derivatives`, `places` are the indices of the n independent
-        speeds, `ways` is N (nu, n).
+        `slopes` has the names of `Derivatives`, `speed_indices` are those of the n independent
+        speeds, `motion_basis` is N (nu, n).
         """
-        own, by_speed, turned = list(places), slopes["u"] @ ways, slopes["rate_q"] @ ways
-        bent = by_speed - ways @ by_speed[own]
-        swept = (bent - turned + ways @ turned[own]) / 2
-        by_place = slopes["q"] @ ways + slopes["u"] @ swept
+        own, by_speed, turned = (
+            list(speed_indices),
+            slopes["u"] @ motion_basis,
+            slopes["rate_q"] @ motion_basis,
+        )
+        bent = by_speed - motion_basis @ by_speed[own]
+        swept = (bent - turned + motion_basis @ turned[own]) / 2
+        by_place = slopes["q"] @ motion_basis + slopes["u"] @ swept
         turning = turned[own] if turned.any() else None
-        shifted = by_place - ways @ by_place[own]
+        shifted = by_place - motion_basis @ by_place[own]
         return cls(swept, by_speed[own], by_place[own], bent, shifted, turning)
 
     def matrices(self, mass: Array) -> Matrices:
         """M, C, K of M dv' + C dv + K x = 0 from the mass matrix M (n, n) along x."""
-        return Matrices(mass, -mass @ self.going, -mass @ self.placed)
+        return Matrices(mass, -mass @ self.speed_derivatives, -mass @ self.position_derivatives)
 
-    def below(self, order: int) -> Iterator[tuple[int, Array]]:
+    def lower_order_terms(self, order: int) -> Iterator[tuple[int, Array]]:
         """Lower-order terms (order, (nu, n)) of all speeds (1) or accelerations (2)."""
         if order == 1:
             yield 0, self.swept
         if order == 2:
-            yield 1, self.bent
-            yield 0, self.shifted
+            yield 1, self.dependent_speed_part
+            yield 0, self.dependent_position_part

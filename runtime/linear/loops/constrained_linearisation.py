@@ -28,7 +28,7 @@ from ...engine.compiled_scene import CompiledScene
 from ...engine.looped_engine import LoopedEngine
 from ...packing.loops.system_variants import with_loops_open
 from ...packing.scene_packing import packed_system
-from ..drive_inputs import Columns, Moves, coordinate, slopes_along
+from ..drive_inputs import Columns, DriveFactors, coordinate, residual_derivatives
 from ..input_channels import Channel, columns
 from ..mck_matrices import Matrices, State, matrices
 from ..operating_point.friction import DryFriction
@@ -46,94 +46,103 @@ class ConstrainedLinearisation:
         model: the model of the scene.
         tree: spanning tree of the scene, with dry friction as in the linear model.
         free: indices of the speeds of the tree without prescribed motion.
-        places: indices of the n independent speeds, those of x.
-        ways: (nu, n) N, all speeds for a unit of each independent speed.
-        turned: (n, n) geometric stiffness of the constraint loads at rest.
+        independent_indices: indices of the n independent speeds, those of x.
+        motion_basis: (nu, n) N, all speeds for a unit of each independent speed.
+        constraint_stiffness: (n, n) geometric stiffness of the constraint loads at rest.
         motion: derivatives about a moving or accelerating state, from `slopes`; else None.
         slopes: derivatives of the accelerations at a state; None at rest.
-        rough: spanning tree with all its dry friction, the basis of `slopes`.
+        tree_with_friction: spanning tree with all its dry friction, the basis of `slopes`.
         dry: dry friction that viscous dampers replace in `tree`.
     """
 
     model: CompiledScene = field(repr=False)
     tree: LoopedEngine
     free: tuple[int, ...]
-    places: tuple[int, ...]
-    ways: Array
-    turned: Array = field(repr=False)
+    independent_indices: tuple[int, ...]
+    motion_basis: Array
+    constraint_stiffness: Array = field(repr=False)
     motion: Motion | None = field(default=None, repr=False)
     slopes: Slopes | None = field(default=None, repr=False)
-    rough: LoopedEngine | None = field(default=None, repr=False)
+    tree_with_friction: LoopedEngine | None = field(default=None, repr=False)
     dry: DryFriction | None = field(default=None, repr=False)
 
     @property
-    def turning(self) -> Array | None:
+    def rate_matrix(self) -> Array | None:
         """Matrix G (n, n), 1/s, of x' = G x + dv; None where x are integrals of the speeds v."""
-        return None if self.motion is None else self.motion.turning
+        return None if self.motion is None else self.motion.rate_matrix
 
-    def at(self, state: State) -> ConstrainedLinearisation | None:
+    def at_state(self, state: State) -> ConstrainedLinearisation | None:
         """The same linearisation at another state."""
         if self.slopes is None:
             return mechanism_at(self.model, state, self.dry)
-        return moving_at(self.model, state, self.slopes, self.places, self.dry)
+        return mechanism_in_motion(
+            self.model, state, self.slopes, self.independent_indices, self.dry
+        )
 
     def matrices(self, engine: LoopedEngine, state: State) -> Matrices:
         """Matrices M, C, K along x for the tree, or for an engine of it with other elements."""
-        found = self._along(engine, state)
+        projected = self._project(engine, state)
         if self.motion is None:
-            return Matrices(found.M, found.C, found.K + self.turned)
-        whole = self.motion.matrices(found.M)
-        rough = self.rough or self.tree
+            return Matrices(projected.M, projected.C, projected.K + self.constraint_stiffness)
+        whole = self.motion.matrices(projected.M)
+        rough = self.tree_with_friction or self.tree
         if engine is rough:
             return whole
-        tree = self._along(rough, state)  # the constraint loads are the same for both
-        return Matrices(found.M, whole.C + found.C - tree.C, whole.K + found.K - tree.K)
+        tree = self._project(rough, state)  # the constraint loads are the same for both
+        return Matrices(projected.M, whole.C + projected.C - tree.C, whole.K + projected.K - tree.K)
 
-    def _along(self, engine: LoopedEngine, state: State) -> Matrices:
+    def _project(self, engine: LoopedEngine, state: State) -> Matrices:
         swept = None if self.motion is None else self.motion.swept
-        return _along(engine, state, self.free, self.ways, self.ways, swept)
-
-    def pushed(self, state: State, channels: Sequence[Channel]) -> Array:
-        """Efforts (n, channels) along x for a unit of each input; for drives, of acceleration."""
-        every, found = list(range(len(self.ways))), np.zeros((len(self.places), len(channels)))
-        still = [k for k, one in enumerate(channels) if one.drive < 0]
-        pushes = [channels[k] for k in still]
-        found[:, still] = self.ways.T @ columns(self.tree, state, pushes, every)
-        for k, one in enumerate(channels):
-            if one.drive >= 0:
-                found[:, k] = -self.driven(state, one.moves).inertia
-        return found
-
-    def driven(self, state: State, moves: Moves) -> Columns:
-        """Columns (n,) along x of stiffness, damping and inertia for drives moved by one input."""
-        along = np.sum([factor * self._driving(state, speed) for speed, factor in moves], axis=0)
-        closed, tree = self.model.looped, self.tree
-        rows = _with_own_still(self.model, self.ways)
-        return Columns(
-            rows.T @ slopes_along(closed, state, along).stiffness,
-            self.ways.T @ slopes_along(tree, state, along).damping,
-            self.ways.T @ slopes_along(tree, state, along).inertia,
+        return _projected_matrices(
+            engine, state, self.free, self.motion_basis, self.motion_basis, swept
         )
 
-    def _driving(self, state: State, speed: int) -> Array:
+    def input_matrix(self, state: State, channels: Sequence[Channel]) -> Array:
+        """Efforts (n, channels) along x for a unit of each input; for drives, of acceleration."""
+        every, columns_found = (
+            list(range(len(self.motion_basis))),
+            np.zeros((len(self.independent_indices), len(channels))),
+        )
+        still = [k for k, given in enumerate(channels) if given.drive < 0]
+        pushes = [channels[k] for k in still]
+        columns_found[:, still] = self.motion_basis.T @ columns(self.tree, state, pushes, every)
+        for k, given in enumerate(channels):
+            if given.drive >= 0:
+                columns_found[:, k] = -self.drive_columns(state, given.drive_factors).inertia
+        return columns_found
+
+    def drive_columns(self, state: State, moves: DriveFactors) -> Columns:
+        """Columns (n,) along x of stiffness, damping and inertia for drives moved by one input."""
+        along = np.sum(
+            [factor * self._drive_motion(state, speed) for speed, factor in moves], axis=0
+        )
+        closed, tree = self.model.looped, self.tree
+        rows = _zero_cut_hinge_rows(self.model, self.motion_basis)
+        return Columns(
+            rows.T @ residual_derivatives(closed, state, along).stiffness,
+            self.motion_basis.T @ residual_derivatives(tree, state, along).damping,
+            self.motion_basis.T @ residual_derivatives(tree, state, along).inertia,
+        )
+
+    def _drive_motion(self, state: State, speed: int) -> Array:
         """Vector n (nu,): all speeds for a unit of one prescribed speed.
 
         Raises SceneError where the loops lock the drive, and about a state that is not at rest.
         """
         if self.motion is not None:
             raise SceneError(
-                f'"{coordinate(self.model, speed)}": motions of drives of closed loops are inputs '
-                "beside a state at rest, and this one moves or does not last; leave them out"
+                f'"{coordinate(self.model, speed)}": drive motions in closed loops can be inputs '
+                "at an equilibrium only, and this state is not one; leave them out"
             )
-        freedom = self.model.freedom
+        freedom = self.model.independent_speeds
         assert freedom is not None
-        along = freedom.driving(state.q, speed)
+        along = freedom.prescribed_motion(state.q, speed)
         if not np.isfinite(along).all():
             raise SceneError(
-                f'"{coordinate(self.model, speed)}": the loops do not let this drive move at this '
-                "state; take a state beside it, or another input"
+                f'"{coordinate(self.model, speed)}": the loops lock this drive at this state; use '
+                "a nearby state, or another input"
             )
-        return np.asarray(along - self.ways @ along[list(self.places)])
+        return np.asarray(along - self.motion_basis @ along[list(self.independent_indices)])
 
     def rows(
         self, state: State, orders: Mapping[int, Array], drives: Collection[int]
@@ -142,15 +151,17 @@ class ConstrainedLinearisation:
 
         The entries of x and of drives are at the indices of their speeds.
         """
-        found, places = dict[int, Array](), list(self.places)
+        rows_by_order, speed_indices = dict[int, Array](), list(self.independent_indices)
         for order, wide in orders.items():
-            rows = found.setdefault(order, np.zeros_like(wide))
-            rows[:, places] += wide @ self.ways
+            rows = rows_by_order.setdefault(order, np.zeros_like(wide))
+            rows[:, speed_indices] += wide @ self.motion_basis
             for speed in drives:
-                rows[:, speed] += wide @ self._driving(state, speed)
-            for lower, along in () if self.motion is None else self.motion.below(order):
-                found.setdefault(lower, np.zeros_like(wide))[:, places] += wide @ along
-        return found
+                rows[:, speed] += wide @ self._drive_motion(state, speed)
+            for lower, along in () if self.motion is None else self.motion.lower_order_terms(order):
+                rows_by_order.setdefault(lower, np.zeros_like(wide))[:, speed_indices] += (
+                    wide @ along
+                )
+        return rows_by_order
 
 
 def mechanism_at(
@@ -163,72 +174,100 @@ def mechanism_at(
     Raises NumericalFailure where the independent speeds do not determine all others: dead centre,
     singular configuration, open loop.
     """
-    if model.freedom is None:
+    if model.independent_speeds is None:
         return None
-    found = _mechanism(model, state, model.freedom.chosen(state.q), dry)
-    tree, free, ways = found.tree, found.free, found.ways
-    carried = _along(model.looped, state, free, ways, _with_own_still(model, ways)).K
-    return replace(found, turned=carried - _along(tree, state, free, ways, ways).K)
+    mechanism = _mechanism(model, state, model.independent_speeds.select(state.q), dry)
+    tree, free, motion_basis = mechanism.tree, mechanism.free, mechanism.motion_basis
+    carried = _projected_matrices(
+        model.looped, state, free, motion_basis, _zero_cut_hinge_rows(model, motion_basis)
+    ).K
+    return replace(
+        mechanism,
+        constraint_stiffness=carried
+        - _projected_matrices(tree, state, free, motion_basis, motion_basis).K,
+    )
 
 
-def moving_at(
-    model: CompiledScene, state: State, slopes: Slopes, places: tuple[int, ...] | None = None,
+def mechanism_in_motion(
+    model: CompiledScene, state: State, slopes: Slopes,
+    speed_indices: tuple[int, ...] | None = None,
     dry: DryFriction | None = None,
 ) -> ConstrainedLinearisation | None:  # fmt: skip
     """Linearisation of the closed loops at a moving or accelerating state; None for a tree.
 
-    The independent speeds are those at the indices `places`, by default a well-conditioned choice.
+    The independent speeds have the indices `speed_indices`, by default a well-conditioned choice.
     Viscous dampers replace `dry` friction.
 
     Raises SceneError for scenes whose accelerations have no derivatives, NumericalFailure as
     `mechanism_at`.
     """
-    if model.freedom is None:
+    if model.independent_speeds is None:
         return None
-    found = _mechanism(model, state, places or model.freedom.chosen(state.q), dry)
-    return replace(found, motion=Motion.of(slopes(state), found.places, found.ways), slopes=slopes)
+    mechanism = _mechanism(
+        model, state, speed_indices or model.independent_speeds.select(state.q), dry
+    )
+    return replace(
+        mechanism,
+        motion=Motion.from_derivatives(
+            slopes(state), mechanism.independent_indices, mechanism.motion_basis
+        ),
+        slopes=slopes,
+    )
 
 
 def _mechanism(
-    model: CompiledScene, state: State, places: tuple[int, ...], dry: DryFriction | None
+    model: CompiledScene, state: State, speed_indices: tuple[int, ...], dry: DryFriction | None
 ) -> ConstrainedLinearisation:
     """Linearisation without the effects of constraint loads and of motion."""
-    freedom = model.freedom
+    freedom = model.independent_speeds
     assert freedom is not None
-    ways, n = freedom.following(state.q, places), len(places)
+    motion_basis, n = freedom.motion_matrix(state.q, speed_indices), len(speed_indices)
     rough, tree = torn_trees(model, dry)
     return ConstrainedLinearisation(
-        model, tree, model.free_speeds, places, ways, np.zeros((n, n)), rough=rough, dry=dry
+        model,
+        tree,
+        model.free_speed_indices,
+        speed_indices,
+        motion_basis,
+        np.zeros((n, n)),
+        tree_with_friction=rough,
+        dry=dry,
     )
 
 
 def torn_trees(model: CompiledScene, dry: DryFriction | None) -> tuple[LoopedEngine, LoopedEngine]:
     """Spanning tree of the scene, and the same with viscous dampers for `dry` friction."""
-    packed, system = model.packed, with_loops_open(model.packed.system)
+    packed, system = model.packed_scene, with_loops_open(model.packed_scene.system)
     tree = LoopedEngine(packed_system(system, packed))
     if not dry:
         return tree, tree
     return tree, LoopedEngine(
-        packed_system(replace(system, laws=dry.replaced(system.laws)), packed)
+        packed_system(replace(system, laws=dry.replace_friction(system.laws)), packed)
     )
 
 
-def _along(
-    engine: LoopedEngine, state: State, free: tuple[int, ...], ways: Array, rows: Array,
+def _projected_matrices(
+    engine: LoopedEngine, state: State, free: tuple[int, ...], motion_basis: Array, rows: Array,
     swept: Array | None = None,
 ) -> Matrices:  # fmt: skip
     """Projected matrices rows^T (M, C, K) ways; K includes the change `swept` of speeds with x."""
-    found, n, left = matrices(engine, state, list(free)), ways[list(free)], rows[list(free)]
-    mass, damping, stiffness = (left.T @ matrix @ n for matrix in (found.M, found.C, found.K))
+    tree_matrices, n, left = (
+        matrices(engine, state, list(free)),
+        motion_basis[list(free)],
+        rows[list(free)],
+    )
+    mass, damping, stiffness = (
+        left.T @ matrix @ n for matrix in (tree_matrices.M, tree_matrices.C, tree_matrices.K)
+    )
     if swept is not None:
-        stiffness = stiffness + left.T @ found.C @ swept[list(free)]
+        stiffness = stiffness + left.T @ tree_matrices.C @ swept[list(free)]
     return Matrices(mass, damping, stiffness)
 
 
-def _with_own_still(model: CompiledScene, ways: Array) -> Array:
-    """`ways` (nu, n) with zero rows for cut hinges, whose loads act on their bodies instead."""
-    system, rows = model.packed.system, ways.copy()
-    for one in system.closures:
-        first = int(system.places["u"][one.frame])
-        rows[first : first + system.body(one.frame).nu] = 0.0
+def _zero_cut_hinge_rows(model: CompiledScene, motion_basis: Array) -> Array:
+    """`motion_basis` (nu, n) with zero rows for cut hinges, whose loads act on their bodies."""
+    system, rows = model.packed_scene.system, motion_basis.copy()
+    for closure in system.closures:
+        first = int(system.first_indices["u"][closure.frame])
+        rows[first : first + system.body(closure.frame).nu] = 0.0
     return rows

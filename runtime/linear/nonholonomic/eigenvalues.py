@@ -20,13 +20,13 @@ def eigenpairs(a: Array) -> tuple[Complex, Complex]:
     Of each conjugate pair only the eigenvalue above the real axis is kept.  Ignorable coordinates
     have eigenvalue 0 exactly.
     """
-    core, ignorable = core_of(a)
-    values, own = _without_zeros(a[np.ix_(core, core)])
+    core, ignorable = coupled_states(a)
+    values, own = _deflated_eigenpairs(a[np.ix_(core, core)])
     vectors = np.zeros((len(a), len(values)), dtype=np.complex128)
     vectors[core] = own
     moving = values != 0
-    for place in reversed(ignorable):
-        vectors[place, moving] = (a[place] @ vectors)[moving] / values[moving]
+    for index in reversed(ignorable):
+        vectors[index, moving] = (a[index] @ vectors)[moving] / values[moving]
     values = np.concatenate([np.zeros(len(ignorable)), values])
     vectors = np.hstack([np.eye(len(a))[:, ignorable], vectors])
     kept = np.flatnonzero(values.imag >= 0)
@@ -34,7 +34,7 @@ def eigenpairs(a: Array) -> tuple[Complex, Complex]:
     return values[kept], vectors[:, kept]
 
 
-def _without_zeros(a: Array) -> tuple[Complex, Complex]:
+def _deflated_eigenpairs(a: Array) -> tuple[Complex, Complex]:
     """Eigenvalues and eigenvectors of A (n, n), with the null space deflated stage by stage.
 
     Deflation is needed since a defective zero eigenvalue is otherwise accurate only to a root of
@@ -42,44 +42,44 @@ def _without_zeros(a: Array) -> tuple[Complex, Complex]:
     """
     still, across, lengths = np.eye(0), np.eye(0), np.zeros(0)
     if len(a):
-        _, lengths, across = np.linalg.svd(_by_rows(a))
+        _, lengths, across = np.linalg.svd(_scale_rows(a))
     count = int((lengths <= _NOTHING * lengths.max(initial=0.0)).sum())
     if not count:
         values, vectors = np.linalg.eig(a) if len(a) else (np.zeros(0), np.zeros((0, 0)))
-        return _rounded(values.astype(np.complex128)), vectors.astype(np.complex128)
+        return _round_to_zero(values.astype(np.complex128)), vectors.astype(np.complex128)
     rest, still = across[:-count].T, across[-count:].T
-    values, inner = _without_zeros(rest.T @ a @ rest)
+    values, inner = _deflated_eigenpairs(rest.T @ a @ rest)
     vectors = rest @ inner
     moving = values != 0
     vectors[:, moving] += still @ (still.T @ a @ vectors[:, moving]) / values[moving]
     return np.concatenate([np.zeros(count), values]), np.hstack([still, vectors])
 
 
-def _by_rows(a: Array) -> Array:
+def _scale_rows(a: Array) -> Array:
     """A with each row scaled by its largest entry, as stiff and slow parts differ in size."""
     largest = np.abs(a).max(axis=1, initial=0.0)
     floor = _LEAST * float(largest.max(initial=0.0)) or 1.0
     return np.asarray(a / np.maximum(largest, floor)[:, None])
 
 
-def _rounded(values: Complex) -> Complex:
+def _round_to_zero(values: Complex) -> Complex:
     """Eigenvalues with real or imaginary parts at rounding level set to zero."""
     rounding = _PART * np.abs(values).max(initial=0.0)
     values = np.where(np.abs(values.imag) <= rounding, values.real, values)
     return np.where(np.abs(values.real) <= rounding, 1j * values.imag, values)
 
 
-def core_of(a: Array) -> tuple[list[int], list[int]]:
+def coupled_states(a: Array) -> tuple[list[int], list[int]]:
     """Indices of the coupled states, and of ignorable states in the order of their elimination.
 
     No remaining state depends on an ignorable one.
     """
-    core, ignorable, scaled = list(range(len(a))), list[int](), np.abs(_by_rows(a))
+    core, ignorable, scaled = list(range(len(a))), list[int](), np.abs(_scale_rows(a))
     while True:
-        for place in core:
-            if scaled[core, place].max(initial=0.0) <= _NOTHING:
+        for index in core:
+            if scaled[core, index].max(initial=0.0) <= _NOTHING:
                 break
         else:
             return core, ignorable
-        core.remove(place)
-        ignorable.append(place)
+        core.remove(index)
+        ignorable.append(index)

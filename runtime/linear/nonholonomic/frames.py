@@ -50,10 +50,10 @@ class Frames:
 def frames_at(model: CompiledScene, state: State) -> Frames:
     """Frames in which the speeds of a state have the smallest rates of change."""
     rates, generator = dict[str, Array](), np.zeros((model.nu, model.nu))
-    for slots in _turning(model):
+    for slots in _quaternion_hinges(model):
         parts = [slice(k, k + 3) for k in range(slots.u, slots.u + slots.nu, 3)]
         speeds = np.vstack([cross_matrix(state.u[part]) for part in parts])
-        changes = np.concatenate([state.a[part] for part in parts])
+        changes = np.concatenate([state.udot[part] for part in parts])
         rate = np.linalg.lstsq(speeds, changes, rcond=_ROUNDING)[0]  # u x w = du/dt
         if np.abs(rate).max() > _ROUNDING * np.abs(state.u[slots.u_slice]).max(initial=0.0):
             rates[slots.name] = rate
@@ -62,9 +62,9 @@ def frames_at(model: CompiledScene, state: State) -> Frames:
     return Frames(rates, generator)
 
 
-def turns_in_space(model: CompiledScene, state: State, frames: Frames) -> bool:
+def has_rotating_frame(model: CompiledScene, state: State, frames: Frames) -> bool:
     """Whether a frame of a ball or free hinge rotates relative to the inboard body."""
-    for slots in _turning(model):
+    for slots in _quaternion_hinges(model):
         speeds = state.u[slots.u + slots.nu - 3 : slots.u + slots.nu]
         left = np.abs(speeds - frames.rates.get(slots.name, 0.0)).max()
         if left > _ROUNDING * np.abs(state.u[slots.u_slice]).max():
@@ -72,10 +72,10 @@ def turns_in_space(model: CompiledScene, state: State, frames: Frames) -> bool:
     return False
 
 
-def _turning(model: CompiledScene) -> Iterator[HingeSlots]:
+def _quaternion_hinges(model: CompiledScene) -> Iterator[HingeSlots]:
     """Quaternion hinges with speeds in axes of the outboard body, angular speeds last."""
-    for slots in model.layout.hinges.values():
-        if slots.quaternion is not None and slots.steady and slots.nu in (3, 6):
+    for slots in model.coordinate_layout.hinges.values():
+        if slots.quaternion is not None and slots.constant_subspace and slots.nu in (3, 6):
             yield slots
 
 

@@ -1,7 +1,7 @@
 """First-order linear models (A, B) with nonholonomic rows: rolling contacts, coupled speeds.
 
 The state z = (x, v) holds the independent positions and speeds of the admissible perturbations
-(`admissible`).  Rates and accelerations are linear in all perturbations and speeds,
+(`admissible_perturbations`).  Rates and accelerations are linear in all perturbations and speeds,
 d/dt (phi, du) = F (phi, du), with (phi, du) = L z and z = E (phi, du).  R rotates from the axes of
 the bodies to the frames, with dR/dt = R W (`frames`); in the frames
 
@@ -27,22 +27,22 @@ from mstmm.risk import RUN, DeferredRisks, Risk
 from mstmm.safe_text import abbreviate_names
 
 from ...engine.characteristic_scales import speed_scales
-from ...risk_checks.answers import find_state_risks
+from ...risk_checks.state_risks import find_state_risks
 from ...run.scene_system import SceneSystem
 from .. import energy_shares
-from ..frequency_response import FrequencyResponse, angular_frequencies, chosen_pushes
-from ..harmonic.damping_checks import refuse_in_motion
+from ..frequency_response import FrequencyResponse, angular_frequencies, select_inputs
+from ..harmonic.damping_checks import check_state_at_rest
 from ..input_channels import Channel, columns, some_names
 from ..linear_model import Linear
 from ..mck_matrices import State, matrices
 from ..modes import Modes
-from ..operating_point.sticking import Ways, friction_risks, saturation_risks
+from ..operating_point.friction_risks import IndependentMotions, friction_risks, saturation_risks
 from ..outputs.linear_outputs import Rows, outputs_of, rows_of
-from ..rotors.later import SAME, apart
-from ..validity import find_omissions, find_response_risks, without_effect
-from .admissible import RollingMechanism, refuse_second_order, rolling_at
-from .eigenvalues import core_of, eigenpairs
-from .frames import Frames, frames_at, turns_in_space
+from ..rotors.later_equations import SAME, relative_difference
+from ..validity import find_omissions, find_response_risks, ineffective_input_risks
+from .admissible_perturbations import RollingMechanism, reject_second_order, rolling_at
+from .eigenvalues import coupled_states, eigenpairs
+from .frames import Frames, frames_at, has_rotating_frame
 
 if TYPE_CHECKING:
     from ..outputs.output_rows import LinearQuantity
@@ -79,28 +79,28 @@ class NonholonomicLinear(Linear):
 
     @property
     def _rolling(self) -> RollingMechanism:
-        assert isinstance(self.mechanism, RollingMechanism)
-        return self.mechanism
+        assert isinstance(self.constrained_motion, RollingMechanism)
+        return self.constrained_motion
 
     @property
     def speeds(self) -> tuple[str, ...]:
         """Names of v."""
-        return tuple(self.model.layout.u_name(k) for k in self._rolling.speed_places)
+        return tuple(self.model.coordinate_layout.u_name(k) for k in self._rolling.speed_indices)
 
     @property
-    def states(self) -> tuple[str, ...]:
+    def state_names(self) -> tuple[str, ...]:
         """Names of (x, v)."""
-        return (*self.coordinates, *self.speeds)
+        return (*self.coordinate_names, *self.speeds)
 
     @property
-    def positions(self) -> list[int]:
+    def position_states(self) -> list[int]:
         """Indices of x in the state."""
         return list(range(len(self)))
 
     @property
-    def velocities(self) -> list[int]:
+    def velocity_states(self) -> list[int]:
         """Indices of v in the state."""
-        return list(range(len(self), len(self.states)))
+        return list(range(len(self), len(self.state_names)))
 
     @property
     def has_stiffness(self) -> bool:
@@ -122,7 +122,7 @@ class NonholonomicLinear(Linear):
 
         The frame of a disc that rolls in a circle follows its heading.
         """
-        return "rotating" if turns_in_space(self.model, self.state, self.frames) else "fixed"
+        return "rotating" if has_rotating_frame(self.model, self.state, self.frames) else "fixed"
 
     def to_fixed_frame(self) -> NonholonomicLinear:
         """The model itself if its frame is fixed.
@@ -132,8 +132,8 @@ class NonholonomicLinear(Linear):
         if self.frame == "fixed":
             return self
         raise SceneError(
-            "to_fixed_frame: beside rolling contacts coefficients last in frames that follow the "
-            "motion alone; take the model as it is"
+            "to_fixed_frame: with rolling contacts, coefficients are constant only in frames that "
+            "follow the motion; use the model as it is"
         )
 
     # --- matrices ---------------------------------------------------------------------------------
@@ -141,76 +141,77 @@ class NonholonomicLinear(Linear):
     @cached_property
     def _slopes(self) -> Mapping[str, Array]:
         """Derivatives of rates and accelerations, with dry friction as in the model."""
-        found, rolling = dict(self.slopes(self.state)), self._rolling
-        if self.dry and rolling.rough is not None:
+        slopes, rolling = dict(self.slopes(self.state)), self._rolling
+        if self.dry and rolling.tree_with_friction is not None:
             free, left = list(rolling.free), np.zeros((self.model.nu, self.model.nu))
             rough, smooth = (
-                matrices(tree, self.state, free).C for tree in (rolling.rough, rolling.tree)
+                matrices(tree, self.state, free).C
+                for tree in (rolling.tree_with_friction, rolling.tree)
             )
             left[np.ix_(free, free)] = rough - smooth
-            found["u"] = found["u"] + found["efforts"] @ left
-        return found
+            slopes["u"] = slopes["u"] + slopes["efforts"] @ left
+        return slopes
 
     @property
-    def turned(self) -> Array:
+    def frame_rotation(self) -> Array:
         """Rotation R (nu, nu) of perturbations or speeds from body axes to the frames."""
         return np.eye(self.model.nu) if self.rotation is None else self.rotation
 
     @cached_property
-    def _turned(self) -> Array:
+    def _state_rotation(self) -> Array:
         """Rotation (2 nu, 2 nu) of both perturbations and speeds."""
-        return np.asarray(block_diag(self.turned, self.turned))
+        return np.asarray(block_diag(self.frame_rotation, self.frame_rotation))
 
     @cached_property
     def _basis(self) -> Array:
         """Basis L (2 nu, n + m) in the frames."""
-        basis = self._turned @ self._rolling.basis
-        return np.asarray(basis @ np.linalg.inv(basis[self._rolling.own]))
+        basis = self._state_rotation @ self._rolling.basis
+        return np.asarray(basis @ np.linalg.inv(basis[self._rolling.state_indices]))
 
     @cached_property
     def A(self) -> Array:
         """State matrix (n + m, n + m)."""
-        slopes, turned, basis = self._slopes, self._turned, self._basis
+        slopes, turned, basis = self._slopes, self._state_rotation, self._basis
         both = np.block([[slopes["rate_q"], slopes["rate_u"]], [slopes["q"], slopes["u"]]])
         rates = self.frames.twice() @ basis + turned @ both @ (turned.T @ basis)
-        return np.asarray(rates[self._rolling.own])
+        return np.asarray(rates[self._rolling.state_indices])
 
     @cached_property
     def B(self) -> Array:
         """Input matrix (n + m, inputs)."""
-        return self._effect(self.controls)
+        return self._effect(self.input_channels)
 
     @cached_property
     def B_disturbances(self) -> Array:
         """Input matrix (n + m, disturbances) of w."""
-        return self._effect(self.others)
+        return self._effect(self.disturbance_channels)
 
     def _effect(self, pushes: Sequence[Channel]) -> Array:
         """Input matrix (n + m, inputs) of some inputs."""
-        if any(one.drive >= 0 for one in pushes):
-            self._rolling.driven()
+        if any(given.drive >= 0 for given in pushes):
+            self._rolling.drive_columns()
         nu, tree = self.model.nu, self._rolling.tree
         answers = self._slopes["efforts"] @ columns(tree, self.state, pushes, list(range(nu)))
-        found = self._turned @ np.vstack([np.zeros_like(answers), answers])
-        return np.asarray(found[self._rolling.own])
+        effect = self._state_rotation @ np.vstack([np.zeros_like(answers), answers])
+        return np.asarray(effect[self._rolling.state_indices])
 
-    def _of(self, *_: object) -> NoReturn:
-        refuse_second_order(self._rolling)
+    def _matrices_of(self, *_: object) -> NoReturn:
+        reject_second_order(self._rolling)
 
-    def observed(self, rows: Rows, b: Array) -> tuple[Array, Array]:
+    def state_output_matrices(self, rows: Rows, b: Array) -> tuple[Array, Array]:
         """Output matrices C (outputs, states) and D (outputs, inputs) of output rows.
 
         `rows` are along perturbations, speeds and accelerations; `b` (states, inputs) is the input
         matrix.
         """
-        increments, speeds = np.split(self._turned.T @ self._basis, 2)
+        increments, speeds = np.split(self._state_rotation.T @ self._basis, 2)
         slopes = self._slopes
         along = (increments, speeds, slopes["q"] @ increments + slopes["u"] @ speeds)
-        c, d = np.zeros((len(rows.through), len(self.states))), rows.through.copy()
+        c, d = np.zeros((len(rows.feedthrough), len(self.state_names))), rows.feedthrough.copy()
         for order, wide in rows.orders.items():
             c += wide @ along[order]
             if order == 2:
-                d += wide @ speeds[:, self.velocities] @ b[self.velocities]
+                d += wide @ speeds[:, self.velocity_states] @ b[self.velocity_states]
         return c, d
 
     # --- modes and frequency response -------------------------------------------------------------
@@ -224,17 +225,19 @@ class NonholonomicLinear(Linear):
         Raises SceneError for an invalid count, and for `damped` false.
         """
         if damped is not None and not damped:
-            raise SceneError("damped = False: A beside rolling contacts has no parts; leave it out")
-        self.check_count(count, len(self.states))
+            raise SceneError(
+                "damped = False: with rolling contacts A has no undamped part; omit it"
+            )
+        self.check_count(count, len(self.state_names))
         values, vectors = eigenpairs(self.A)
         n, k = len(self), np.arange(len(values))
         shapes = np.where(vectors[:n].any(axis=0), vectors[:n], self.A[:n] @ vectors)
         largest = shapes[np.abs(shapes).argmax(axis=0), k] if n else np.ones(len(k))
         scale = np.where(largest == 0, 1.0, largest)
-        increments, speeds = np.split(self._turned.T @ self._basis @ (vectors / scale), 2)
+        increments, speeds = np.split(self._state_rotation.T @ self._basis @ (vectors / scale), 2)
         moved = np.where(speeds.any(axis=0), speeds, increments)
-        found = NonholonomicModes(self, values, shapes / scale, True, moved)
-        return found if count is None else found.first(int(count))
+        modes_found = NonholonomicModes(self, values, shapes / scale, True, moved)
+        return modes_found if count is None else modes_found.lowest(int(count))
 
     def frequency_response(
         self,
@@ -253,26 +256,27 @@ class NonholonomicLinear(Linear):
         Raises SceneError for exact beams, for structural or modal damping about a moving state, and
         where coefficients, inputs or outputs change along the motion.
         """
-        refuse_in_motion(self, structural, modal)
+        check_state_at_rest(self, structural, modal)
         if exact is not False:
-            raise SceneError("exact: beside rolling contacts beams have shapes alone; leave it out")
-        frequencies, pushes = angular_frequencies(omega), chosen_pushes(self, inputs)
+            raise SceneError("exact: not supported with rolling contacts; leave it out")
+        frequencies, pushes = angular_frequencies(omega), select_inputs(self, inputs)
         shown = outputs_of(self, None if outputs is None else some_names("outputs", outputs))
-        self._refuse_unsteady(pushes, shown)
+        self._check_steady(pushes, shown)
         b = self._effect(pushes)
-        c, d = self.observed(rows_of(self, shown, pushes), b)
-        values = np.array([c @ self._solve(one, b) + d for one in frequencies])
+        c, d = self.state_output_matrices(rows_of(self, shown, pushes), b)
+        values = np.array([c @ self._solve(frequency, b) + d for frequency in frequencies])
         return FrequencyResponse(
-            frequencies, tuple(one.name for one in pushes), tuple(one.name for one in shown),
-            tuple(one.unit for one in pushes), tuple(one.unit for one in shown), values,
+            frequencies,
+            tuple(channel.name for channel in pushes), tuple(entry.name for entry in shown),
+            tuple(channel.unit for channel in pushes), tuple(entry.unit for entry in shown), values,
             DeferredRisks(lambda: find_response_risks(self, pushes, outputs is not None)),
         )  # fmt: skip
 
     def _solve(self, omega: float, b: Array) -> Complex:
-        shifted = 1j * omega * np.eye(len(self.states)) - self.A
+        shifted = 1j * omega * np.eye(len(self.state_names)) - self.A
         if not np.linalg.cond(shifted) < _SINGULAR:
             raise NumericalFailure(
-                f"frequency response: omega = {omega:.9g} rad/s is a resonance without damping; "
+                f"frequency response: omega = {omega:.9g} rad/s is an undamped resonance; "
                 "add damping, or leave this frequency out"
             )
         return np.asarray(np.linalg.solve(shifted, b), dtype=np.complex128)
@@ -287,83 +291,99 @@ class NonholonomicLinear(Linear):
     def _find_risks(self) -> Iterator[Risk]:
         state = self.state
         yield from find_state_risks(self.model, state.t, state.q, state.u)
-        leaving = self._accelerating()
+        leaving = self._accelerating_speeds()
         if leaving:
             yield Risk(
                 "unsteady-state",
                 abbreviate_names(leaving),
-                f"the state does not last: {abbreviate_names(leaving)} accelerate there, so that "
-                f"the "
-                "model holds beside the motion through it, and only for a moment",
+                f"the state is not steady: {abbreviate_names(leaving)} accelerate, so that the "
+                "model describes deviations from the motion through it, for a short time only",
                 "linearise at an equilibrium or a steady motion",
             )
-        elif self._changes():
+        elif self._has_changing_matrix():
             yield Risk(
                 "changing-coefficients", RUN,
-                "the matrices change along the motion of this state: frequencies and growth of one "
-                "moment are not those of the motion",
+                "the matrices change along the motion of this state: frequencies and growth "
+                "rates at one time are not those of the motion",
                 "simulate the motion, or linearise about a state that keeps its matrices",
             )  # fmt: skip
         yield from friction_risks(self)
-        yield from saturation_risks(self, self._ways)
-        yield from without_effect(self, self.B)
+        yield from saturation_risks(self, self._independent_motions)
+        yield from ineffective_input_risks(self, self.B)
         yield from find_omissions(self)
         yield from self.modes().motion_risks()
 
     @property
-    def _ways(self) -> Ways:
+    def _independent_motions(self) -> IndependentMotions:
         """Motions along the independent speeds."""
-        layout, rolling, places = self.model.layout, self._rolling, list(self._rolling.speed_places)
-        hinges = [layout.hinge_of_speed(k) for k in places]
-        units = [h.u_units[k - h.u].removesuffix("/s") for h, k in zip(hinges, places, strict=True)]
-        along = rolling.speed_ways
-        return Ways(
-            self.speeds, units, speed_scales(self.model)[places], lambda x: along @ x,
+        layout, rolling, speed_indices = (
+            self.model.coordinate_layout,
+            self._rolling,
+            list(self._rolling.speed_indices),
+        )
+        hinges = [layout.hinge_of_speed(k) for k in speed_indices]
+        units = [
+            h.u_units[k - h.u].removesuffix("/s")
+            for h, k in zip(hinges, speed_indices, strict=True)
+        ]
+        along = rolling.speed_basis
+        return IndependentMotions(
+            self.speeds, units, speed_scales(self.model)[speed_indices], lambda x: along @ x,
             lambda efforts: along.T @ efforts,
         )  # fmt: skip
 
-    def _accelerating(self) -> list[str]:
+    def _accelerating_speeds(self) -> list[str]:
         """Names of independent speeds that change in the frames, at this or the later state."""
-        found, sizes = list[str](), speed_scales(self.model)
-        for one in (self, self._later):
-            state, places = one.state, [*self._rolling.speed_places]
-            left = (one.turned @ (state.a + self.frames.generator @ state.u))[places]
+        names, sizes = list[str](), speed_scales(self.model)
+        for model in (self, self._later):
+            state, speed_indices = model.state, [*self._rolling.speed_indices]
+            left = (model.frame_rotation @ (state.udot + self.frames.generator @ state.u))[
+                speed_indices
+            ]
             bound = _STILL + _ROUNDING * float(np.square(state.u / sizes).max(initial=0.0))
-            leaving = np.flatnonzero(np.abs(left) > bound * sizes[places])
-            found += [self.model.layout.u_name(places[k]) for k in leaving]
-        return list(dict.fromkeys(found))
+            leaving = np.flatnonzero(np.abs(left) > bound * sizes[speed_indices])
+            names += [self.model.coordinate_layout.u_name(speed_indices[k]) for k in leaving]
+        return list(dict.fromkeys(names))
 
-    def _changes(self) -> bool:
+    def _has_changing_matrix(self) -> bool:
         """Whether A differs at the later state, except for ignorable coordinates."""
         later = self._later.A
-        kept = np.ix_(*2 * (sorted({*core_of(self.A)[0], *core_of(later)[0]}),))
-        return apart(self.A[kept], later[kept]) > SAME
+        kept = np.ix_(*2 * (sorted({*coupled_states(self.A)[0], *coupled_states(later)[0]}),))
+        return relative_difference(self.A[kept], later[kept]) > SAME
 
     @cached_property
     def _later(self) -> NonholonomicLinear:
         """Linear model at the later state of the motion, in the same frames."""
         model, own = self.model, self._rolling
         state, rotation = _ahead(self)
-        rolling = rolling_at(model, state, None, self.dry, (own.places, own.speed_places))
-        return replace(self, state=state, mechanism=rolling, rotation=rotation)
-
-    def _refuse_unsteady(self, pushes: Sequence[Channel], shown: Sequence[LinearQuantity]) -> None:
-        """Raise SceneError where matrices, inputs or outputs change along the motion."""
-        changing, there = [*self._accelerating()], self._later
-        changing += ["the matrices"] if self._changes() else []
-        now, then = (one._effect(pushes) for one in (self, there))
-        changing += [x.name for k, x in enumerate(pushes) if apart(now[:, k], then[:, k]) > SAME]
-        others = outputs_of(there, [one.name for one in shown])
-        read, later = (
-            one.observed(rows_of(one, some, pushes), b)[0]
-            for one, some, b in ((self, shown, now), (there, others, then))
+        rolling = rolling_at(
+            model, state, None, self.dry, (own.independent_indices, own.speed_indices)
         )
-        changing += [x.name for k, x in enumerate(shown) if apart(read[k], later[k]) > SAME]
+        return replace(self, state=state, constrained_motion=rolling, rotation=rotation)
+
+    def _check_steady(self, pushes: Sequence[Channel], shown: Sequence[LinearQuantity]) -> None:
+        """Raise SceneError where matrices, inputs or outputs change along the motion."""
+        changing, there = [*self._accelerating_speeds()], self._later
+        changing += ["the matrices"] if self._has_changing_matrix() else []
+        now, then = (model._effect(pushes) for model in (self, there))
+        changing += [
+            x.name
+            for k, x in enumerate(pushes)
+            if relative_difference(now[:, k], then[:, k]) > SAME
+        ]
+        later_quantities = outputs_of(there, [quantity.name for quantity in shown])
+        read, later = (
+            model.state_output_matrices(rows_of(model, some, pushes), b)[0]
+            for model, some, b in ((self, shown, now), (there, later_quantities, then))
+        )
+        changing += [
+            x.name for k, x in enumerate(shown) if relative_difference(read[k], later[k]) > SAME
+        ]
         if changing:
             raise SceneError(
-                f"frequency response: along the motion changes {abbreviate_names(changing)}, so "
-                f"that "
-                "other frequencies answer too; push and read what keeps its axes, or simulate"
+                f"frequency response: not constant along the motion: {abbreviate_names(changing)}, "
+                "so that the response contains other frequencies; use inputs and outputs with "
+                "constant axes, or simulate"
             )
 
 
@@ -380,16 +400,16 @@ class NonholonomicModes(Modes):
         assert isinstance(linear, NonholonomicLinear)
         return linear.frame
 
-    def first(self, count: int) -> NonholonomicModes:
+    def lowest(self, count: int) -> NonholonomicModes:
         """The first `count` modes."""
         return replace(
             self, eigenvalues=self.eigenvalues[:count], shapes=self.shapes[:, :count],
             moved=self.moved[:, :count],
         )  # fmt: skip
 
-    def kinetic(self) -> dict[str, Array]:
+    def kinetic_energy_shares(self) -> dict[str, Array]:
         """Share (k,) of each body in the kinetic energy of the modes, by body."""
-        return energy_shares.kinetic_of_speeds(self.linear.model, self.linear.state.q, self.moved)
+        return energy_shares.kinetic_shares(self.linear.model, self.linear.state.q, self.moved)
 
 
 def nonholonomic_at(bare: Linear, slopes: Slopes) -> NonholonomicLinear:
@@ -399,10 +419,11 @@ def nonholonomic_at(bare: Linear, slopes: Slopes) -> NonholonomicLinear:
     """
     model, state, dry = bare.model, bare.state, bare.dry
     frames = frames_at(model, state)
-    changing = state.a + frames.generator @ state.u
+    changing = state.udot + frames.generator @ state.u
     return NonholonomicLinear(
-        model, state, bare.controls, bare.others, mechanism=rolling_at(model, state, changing, dry),
-        dry=dry, frames=frames, slopes=slopes,
+        model, state, bare.input_channels, bare.disturbance_channels,
+        constrained_motion=rolling_at(model, state, changing, dry), dry=dry, frames=frames,
+        slopes=slopes,
     )  # fmt: skip
 
 
@@ -417,17 +438,17 @@ def _ahead(linear: NonholonomicLinear) -> tuple[State, Array]:
     h, q = dt / _STEPS, state.q
 
     def speeds(time: float, at: Array) -> Array:
-        return rolling.kept_speeds(at, state.u, frames.rotation(time))
+        return rolling.admissible_speeds(at, state.u, frames.rotation(time))
 
     def rates(time: float, at: Array) -> Array:
         return np.asarray(engine.rates(state.t + time, at, speeds(time, at), memory))
 
     for k in range(_STEPS):  # classical fourth-order Runge-Kutta method
-        one = rates(k * h, q)
-        two = rates((k + 0.5) * h, q + h / 2 * one)
+        change_of_q = rates(k * h, q)
+        two = rates((k + 0.5) * h, q + h / 2 * change_of_q)
         three = rates((k + 0.5) * h, q + h / 2 * two)
         four = rates((k + 1) * h, q + h * three)
-        q = q + h / 6 * (one + 2 * two + 2 * three + four)
+        q = q + h / 6 * (change_of_q + 2 * two + 2 * three + four)
     whole = SceneSystem(engine).start(state.t + dt, q, speeds(dt, q))
     q, u = whole[: model.nq], whole[model.nq : model.nq + model.nu]
     _, a = engine.accelerations(state.t + dt, q[None].copy(), u[None].copy(), memory[None])

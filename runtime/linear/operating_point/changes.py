@@ -14,7 +14,7 @@ from ..input_channels import Channel
 from ..outputs.linear_outputs import outputs_of, rows_of
 from ..outputs.output_rows import LinearQuantity
 from .departure import LARGEST
-from .later import LaterStates
+from .later_states import LaterStates
 
 if TYPE_CHECKING:
     from ..linear_equations import LinearEquations
@@ -32,8 +32,8 @@ def find_changes(
     shown: Sequence[LinearQuantity] = (),
 ) -> list[str]:
     """Names of inputs and outputs that change along the motion, and `MATRICES` if these do."""
-    names, changing = [one.name for one in shown], dict[str, None]()
-    if not later.sparse:
+    names, changing = [quantity.name for quantity in shown], dict[str, None]()
+    if not later.compared_states:
         return []
     effects, rows = _effects(linear, pushes), _rows(linear, shown, pushes)
     for there in later.equations():
@@ -41,9 +41,9 @@ def find_changes(
             changing[MATRICES] = None
         now = _effects(there, pushes)
         again = _rows(there, outputs_of(there, names) if names else (), pushes)
-        pairs = zip((*(one.name for one in pushes), *names), (*effects, *rows), (*now, *again),
+        pairs = zip((*(push.name for push in pushes), *names), (*effects, *rows), (*now, *again),
                     strict=True)  # fmt: skip
-        changing |= {name: None for name, one, other in pairs if _differ(one, other)}
+        changing |= {name: None for name, first, second in pairs if _differ(first, second)}
     return list(changing)
 
 
@@ -52,9 +52,9 @@ def _effects(linear: LinearEquations, pushes: Sequence[Channel]) -> list[Array]:
     if not pushes:
         return []
     efforts = np.zeros((len(pushes), linear.model.nu))
-    efforts[:, list(linear.free)] = linear.pushed(pushes).T
-    found = HarmonicLoads.of(linear, pushes, efforts)
-    return [found.columns[found.parts[:, k] != 0] for k in range(len(pushes))]
+    efforts[:, list(linear.free_speed_indices)] = linear.input_matrix(pushes).T
+    loads = HarmonicLoads.from_efforts(linear, pushes, efforts)
+    return [loads.columns[loads.parts[:, k] != 0] for k in range(len(pushes))]
 
 
 def _rows(
@@ -65,27 +65,31 @@ def _rows(
     Each row has the factors of increments, rates and accelerations, of those of drives that are
     inputs, and the feedthrough of the inputs.
     """
-    places = [*linear.free, *(speed for one in pushes for speed, _ in one.moves)]
-    found, none = [], np.zeros((1, linear.model.nu))
-    for one in shown:
-        rows = rows_of(linear, [one], pushes)
-        orders = [rows.orders.get(order, none)[0, places] for order in range(3)]
-        found.append(np.concatenate([*orders, rows.through[0]]))
-    return found
+    speed_indices = [
+        *linear.free_speed_indices,
+        *(speed for channel in pushes for speed, _ in channel.drive_factors),
+    ]
+    all_rows, none = [], np.zeros((1, linear.model.nu))
+    for quantity in shown:
+        rows = rows_of(linear, [quantity], pushes)
+        orders = [rows.orders.get(order, none)[0, speed_indices] for order in range(3)]
+        all_rows.append(np.concatenate([*orders, rows.feedthrough[0]]))
+    return all_rows
 
 
-def _differ(one: Array, other: Array) -> bool:
-    scale = max(float(np.abs(x).max(initial=0)) for x in (one, other))
-    return float(np.abs(one - other).max(initial=0)) > _SAME * scale + _ROUNDING
+def _differ(first: Array, second: Array) -> bool:
+    scale = max(float(np.abs(x).max(initial=0)) for x in (first, second))
+    return float(np.abs(first - second).max(initial=0)) > _SAME * scale + _ROUNDING
 
 
-def _matrices_differ(one: LinearEquations, other: LinearEquations) -> bool:
+def _matrices_differ(first_model: LinearEquations, second_model: LinearEquations) -> bool:
     """Whether M, C or K differ, scaled to unit masses and relative to rows and columns."""
-    scale = np.sqrt(np.maximum(one.M.diagonal(), np.finfo(float).tiny))
+    scale = np.sqrt(np.maximum(first_model.M.diagonal(), np.finfo(float).tiny))
     first, second = (
-        [x / np.outer(scale, scale) for x in (at.M, at.C, at.K)] for at in (one, other)
+        [x / np.outer(scale, scale) for x in (at.M, at.C, at.K)]
+        for at in (first_model, second_model)
     )
-    spin = float(np.abs(one.state.u).max(initial=0))
+    spin = float(np.abs(first_model.state.u).max(initial=0))
     stiffness = float(np.abs(first[2]).max(initial=0)) + spin**2
     for a, b, unit in zip(first, second, (1.0, np.sqrt(stiffness), stiffness), strict=True):
         size = np.maximum(np.abs(a), np.abs(b))

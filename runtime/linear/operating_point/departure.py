@@ -12,7 +12,7 @@ from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure
 
 from ...engine.characteristic_scales import scene_length, speed_scales, total_weight
-from .later import LaterStates
+from .later_states import LaterStates
 
 if TYPE_CHECKING:
     from ..linear_equations import LinearEquations
@@ -33,7 +33,7 @@ class Departure:
 
     Attributes:
         coordinates: names of the departing coordinates.
-        worst: coordinate with the largest unbalanced effort.
+        worst_coordinate: coordinate with the largest unbalanced effort.
         effort, unit: that effort, N or N*m.
         t: its time (s).
         is_small: whether springs or gravity keep all of them near the state against a load far
@@ -41,14 +41,15 @@ class Departure:
     """
 
     coordinates: list[str]
-    worst: str
+    worst_coordinate: str
     effort: float
     unit: str
     t: float
     is_small: bool = False
 
     def __str__(self) -> str:
-        return f"{abs(self.effort):.4g} {self.unit} along {self.worst} at t = {self.t:.6g} s"
+        effort = f"{abs(self.effort):.4g} {self.unit}"
+        return f"{effort} along {self.worst_coordinate} at t = {self.t:.6g} s"
 
 
 def find_departure(linear: LinearEquations, later: LaterStates | None = None) -> Departure | None:
@@ -56,21 +57,21 @@ def find_departure(linear: LinearEquations, later: LaterStates | None = None) ->
 
     With `later`, states further along its motion are also checked.
     """
-    states = [linear.state, *(() if later is None else later.every)]
-    free = list(linear.free)
-    a = np.array([one.a[free] for one in states]).T
+    states = [linear.state, *(() if later is None else later.all_states)]
+    free = list(linear.free_speed_indices)
+    a = np.array([later_state.udot[free] for later_state in states]).T
     if not a.any():
         return None
     sizes = speed_scales(linear.model)[free]
-    leaves, efforts, distances = _leaving(linear, a, sizes)
+    leaves, efforts, distances = _departing_coordinates(linear, a, sizes)
     if not leaves.any():
         return None
     if leaves[:, 0].any():  # an immediate departure takes precedence
         leaves[:, 1:] = False
     work = np.where(leaves, np.abs(efforts) * sizes[:, None], 0.0)
     worst, at = np.unravel_index(int(work.argmax()), work.shape)
-    names = [linear.coordinates[k] for k in np.flatnonzero(leaves.any(axis=1))]
-    unit = "N*m" if linear.units[worst] == "rad" else "N"
+    names = [linear.coordinate_names[k] for k in np.flatnonzero(leaves.any(axis=1))]
+    unit = "N*m" if linear.coordinate_units[worst] == "rad" else "N"
     effort = float(efforts[worst, at])
     largest_load = total_weight(linear.model) * scene_length(linear.model)
     is_small = (
@@ -79,10 +80,12 @@ def find_departure(linear: LinearEquations, later: LaterStates | None = None) ->
         and work.max() <= _SMALL_EFFORT * largest_load
         and _forced_distance(linear, later, efforts, sizes) <= _SMALL_DISTANCE
     )
-    return Departure(names, linear.coordinates[worst], effort, unit, states[at].t, bool(is_small))
+    return Departure(
+        names, linear.coordinate_names[worst], effort, unit, states[at].t, bool(is_small)
+    )
 
 
-def _leaving(
+def _departing_coordinates(
     linear: LinearEquations, a: Array, sizes: Array
 ) -> tuple[NDArray[np.bool_], Array, Array]:
     """Departing coordinates, unbalanced efforts and distances for accelerations a (n, k).
@@ -123,16 +126,16 @@ def _forced_distance(
 
 def _efforts(linear: LinearEquations, a: Array) -> Array:
     """Product M a (n, k), for trees without matrices."""
-    if linear.mechanism is not None:
+    if linear.constrained_motion is not None:
         return linear.M @ a
-    return np.array([linear.pencil.mass(column) for column in a.T]).T
+    return np.array([linear.operators.mass(column) for column in a.T]).T
 
 
 def _displacement_by_sweep(linear: LinearEquations, a: Array) -> Array:
     """Distance (n,) from equilibrium, K^-1 M a, without matrices; infinite if K is singular."""
-    if linear.mechanism is not None or linear.turning is not None:
+    if linear.constrained_motion is not None or linear.rate_matrix is not None:
         return np.where(a == 0, 0.0, np.inf)
-    pencil = linear.pencil
+    pencil = linear.operators
     try:
         pencil.factor(0.0)
     except NumericalFailure:

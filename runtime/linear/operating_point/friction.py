@@ -41,7 +41,7 @@ _SLIDING = 10.0
 _KERNEL, _DAMPING, _COULOMB, _STATIC, _STRIBECK, _WIDTH = "full", 2, 3, 4, 5, 6
 
 
-class Rubbing(NamedTuple):
+class StickingFriction(NamedTuple):
     """Friction of one speed that does not slide.
 
     Attributes:
@@ -55,7 +55,7 @@ class Rubbing(NamedTuple):
     coulomb: float
     static: float
     damping: float
-    given: bool
+    is_given: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,40 +63,43 @@ class DryFriction:
     """Friction of the hinges of a model that do not slide, and its equivalent damping."""
 
     model: CompiledScene
-    rubbing: Mapping[int, Rubbing]
+    sticking: Mapping[int, StickingFriction]
     amplitudes: Amplitudes
 
     def __bool__(self) -> bool:
-        return bool(self.rubbing)
+        return bool(self.sticking)
 
-    def replaced(self, laws: tuple[LawRun, ...]) -> tuple[LawRun, ...]:
+    def replace_friction(self, laws: tuple[LawRun, ...]) -> tuple[LawRun, ...]:
         """Laws of the system of the model with viscous damping instead of this friction."""
-        first = self.model.packed.system.places["u"]
+        first = self.model.packed_scene.system.first_indices["u"]
 
-        def change(law: LawNumbers, body: int) -> LawNumbers:
-            one = self.rubbing.get(int(first[body]) + law.speed)
-            if one is None or law.kernel != _KERNEL:
+        def replace_law(law: LawNumbers, body: int) -> LawNumbers:
+            sticking = self.sticking.get(int(first[body]) + law.speed)
+            if sticking is None or law.kernel != _KERNEL:
                 return law
             p = list(law.p)
-            p[_DAMPING] = p[_DAMPING] + one.damping
+            p[_DAMPING] = p[_DAMPING] + sticking.damping
             p[_COULOMB] = p[_STATIC] = 0.0
             return replace(law, p=tuple(p))
 
-        return tuple(law for run in laws for law in changed_laws(run, change))
+        return tuple(law for run in laws for law in change_laws(run, replace_law))
 
     def engine(self, model: CompiledScene) -> LoopedEngine:
         """Looped engine of the model, or of its variant with other parameters, with these laws."""
-        packed = model.packed
-        made = replace(packed.system, laws=self.replaced(packed.system.laws))
-        return LoopedEngine(packed_system(made, packed))
+        packed = model.packed_scene
+        changed_system = replace(packed.system, laws=self.replace_friction(packed.system.laws))
+        return LoopedEngine(packed_system(changed_system, packed))
 
 
-def changed_laws(run: LawRun, change: Callable[[LawNumbers, int], LawNumbers]) -> Iterator[LawRun]:
+def change_laws(run: LawRun, change: Callable[[LawNumbers, int], LawNumbers]) -> Iterator[LawRun]:
     """Yield a run of laws with `change` applied to each law and body index.
 
     The run keeps its pattern if all its repeats change equally; else each law becomes a run.
     """
-    every = [(change(law, body), body, twist, places) for law, body, twist, places in run.each()]
+    every = [
+        (change(law, body), body, twist, speed_indices)
+        for law, body, twist, speed_indices in run.iterate_laws()
+    ]
     width = len(run.pattern)
     pattern = [law for law, _, _, _ in every[:width]]
     if all(law is pattern[k % width] or law == pattern[k % width]
@@ -113,31 +116,33 @@ def dry_friction(model: CompiledScene, u: Array, amplitudes: Amplitudes) -> DryF
 
     Raises SceneError for names without friction and amplitudes that are not positive.
     """
-    system, free = model.packed.system, set(model.free_speeds)
+    system, free = model.packed_scene.system, set(model.free_speed_indices)
     laws = [law for run in system.laws for law in run.pattern]
     if not any(law.kernel == _KERNEL and law.p[_STATIC] for law in laws) and amplitudes is None:
         return DryFriction(model, {}, None)
-    first = system.places["u"]
+    first = system.first_indices["u"]
     acting = {
         int(first[body]) + law.speed: law.p
-        for run in system.laws for law, body, _, _ in run.each()
+        for run in system.laws for law, body, _, _ in run.iterate_laws()
         if law.kernel == _KERNEL and law.p[_STATIC]
     }  # fmt: skip
     amplitude_of = _amplitudes(model, amplitudes, list(acting))
-    found = {
-        speed: _rubbing(speed, p, amplitude_of(speed)) for speed, p in acting.items()
+    hinges = {
+        speed: _sticking_friction(speed, p, amplitude_of(speed)) for speed, p in acting.items()
         if speed in free and abs(u[speed]) <= _SLIDING * p[_WIDTH]
     }  # fmt: skip
-    return DryFriction(model, found, amplitudes)
+    return DryFriction(model, hinges, amplitudes)
 
 
-def _rubbing(speed: int, p: tuple[float, ...], amplitude: float | None) -> Rubbing:
+def _sticking_friction(
+    speed: int, p: tuple[float, ...], amplitude: float | None
+) -> StickingFriction:
     coulomb, static = p[_COULOMB], p[_STATIC]
     if amplitude is None:
-        return Rubbing(speed, coulomb, static, 0.0, False)
+        return StickingFriction(speed, coulomb, static, 0.0, False)
     x = amplitude / p[_STRIBECK]
     level = coulomb + (static - coulomb) * float(dawsn(x)) / x
-    return Rubbing(speed, coulomb, static, 4 * level / (math.pi * amplitude), True)
+    return StickingFriction(speed, coulomb, static, 4 * level / (math.pi * amplitude), True)
 
 
 def _amplitudes(
@@ -149,7 +154,7 @@ def _amplitudes(
     if not isinstance(given, Mapping):
         amplitude = _amplitude("friction", given)
         return lambda speed: amplitude
-    known = {speed: _names(model.layout.u_name(speed)) for speed in speeds}
+    known = {speed: _names(model.coordinate_layout.u_name(speed)) for speed in speeds}
     every = sorted({name for names in known.values() for name in names})
     for name in given:
         if name not in every:
@@ -170,10 +175,10 @@ def _names(speed: str) -> tuple[str, str, str]:
 
 
 def _amplitude(what: str, value: float) -> float:
-    found = finite_float(what, value, "an amplitude of speed in rad/s or m/s, such as 0.1")
-    if found <= 0:
+    amplitude = finite_float(what, value, "an amplitude of speed in rad/s or m/s, such as 0.1")
+    if amplitude <= 0:
         raise SceneError(
-            f"{what} = {found:g}: expected an amplitude of speed above 0 in rad/s or m/s; leave it "
-            "out for a model without dry friction"
+            f"{what} = {amplitude:g}: expected an amplitude of speed above 0 in rad/s or m/s; "
+            "leave it out for a model without dry friction"
         )
-    return found
+    return amplitude

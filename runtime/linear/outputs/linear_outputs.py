@@ -17,7 +17,7 @@ from mstmm.errors import SceneError
 from mstmm.scene import Output
 
 from ...result.scene_outputs import single_quantity_name
-from ..input_channels import columns, names_of
+from ..input_channels import columns, require_names
 from .output_rows import LinearQuantity, formula
 from .quantity_rows import QuantityLookup
 
@@ -39,87 +39,101 @@ def outputs_of(linear: LinearEquations, names: Sequence[str] | None) -> list[Lin
     """
     shown = _Outputs(linear)
     if names is not None:
-        return [one for name in names_of("outputs", names) for one in shown.named(name)]
-    of_scene = [one for output in linear.model.scene.output for one in shown.given(output)]
-    return of_scene or [shown.sight.get(name) for name in linear.coordinates]
+        return [
+            quantity
+            for name in require_names("outputs", names)
+            for quantity in shown.find_by_name(name)
+        ]
+    of_scene = [
+        quantity
+        for output in linear.model.scene.output
+        for quantity in shown.available_quantities(output)
+    ]
+    return of_scene or [shown.lookup.get(name) for name in linear.coordinate_names]
 
 
 def read_by(linear: LinearEquations, names: Sequence[str] | None) -> list[str]:
     """Names of quantities that outputs and their expressions read; None: outputs of the scene."""
     scene = {output.name: output.of.names for output in linear.model.scene.output}
-    found = list[str]()
-    for name in scene if names is None else names_of("outputs", names):
-        found += [one.text for one in scene[name]] if name in scene else [name]
-    return found
+    names_read = list[str]()
+    for name in scene if names is None else require_names("outputs", names):
+        names_read += (
+            [expression_name.text for expression_name in scene[name]] if name in scene else [name]
+        )
+    return names_read
 
 
-def left_out(linear: LinearEquations) -> list[tuple[str, str]]:
+def unavailable_outputs(linear: LinearEquations) -> list[tuple[str, str]]:
     """Outputs (name, reason) of the scene that are not available in the linear model."""
-    shown, found = _Outputs(linear), []
+    shown, unavailable = _Outputs(linear), []
     for output in linear.model.scene.output:
         try:
-            shown.of_scene(output)
+            shown.scene_output_quantities(output)
         except SceneError as error:
-            found.append((output.name, str(error)))
-    return found
+            unavailable.append((output.name, str(error)))
+    return unavailable
 
 
 class _Outputs:
     """Lookup of outputs of one linear model by name."""
 
     def __init__(self, linear: LinearEquations) -> None:
-        self.sight, self._known = QuantityLookup(linear), linear.model.scene.output
+        self.lookup, self._scene_outputs = QuantityLookup(linear), linear.model.scene.output
 
-    def named(self, name: str) -> list[LinearQuantity]:
+    def find_by_name(self, name: str) -> list[LinearQuantity]:
         """Quantities of a name.
 
         Raises SceneError with the closest known name if the name is unknown.
         """
-        for output in self._known:
+        for output in self._scene_outputs:
             if name == output.name or name.rpartition(".")[0] == output.name:
-                every = self.of_scene(output)
+                every = self.scene_output_quantities(output)
                 some = every if name == output.name else [x for x in every if x.name == name]
                 if some:
                     return some
-        return [self.sight.get(name)]
+        return [self.lookup.get(name)]
 
-    def given(self, output: Output) -> list[LinearQuantity]:
+    def available_quantities(self, output: Output) -> list[LinearQuantity]:
         """Quantities of an output of the scene; empty if not available in linear models."""
         try:
-            return self.of_scene(output)
+            return self.scene_output_quantities(output)
         except SceneError:
             return []
 
-    def of_scene(self, output: Output) -> list[LinearQuantity]:
+    def scene_output_quantities(self, output: Output) -> list[LinearQuantity]:
         """Quantities of an output of the scene; the components of a vector."""
         source = single_quantity_name(output)
         try:
             if not source:
-                return [formula(output.of, output.name, output.unit, self.sight.read)]
-            found = self.sight.find(source)
-            if found is not None:
-                return [_renamed(found, output, "")]
-            axes = [(axis, self.sight.find(f"{source}.{axis}")) for axis in _AXES]
-            some = [_renamed(one, output, f".{axis}") for axis, one in axes if one is not None]
-            return some or [self.sight.get(source)]
+                return [formula(output.of, output.name, output.unit, self.lookup.read)]
+            quantity = self.lookup.find(source)
+            if quantity is not None:
+                return [_rename_quantity(quantity, output, "")]
+            axes = [(axis, self.lookup.find(f"{source}.{axis}")) for axis in _AXES]
+            some = [
+                _rename_quantity(quantity, output, f".{axis}")
+                for axis, quantity in axes
+                if quantity is not None
+            ]
+            return some or [self.lookup.get(source)]
         except SceneError as error:
             raise SceneError(f'output "{output.name}": of: {error}') from None
 
 
-def _renamed(found: LinearQuantity, output: Output, component: str) -> LinearQuantity:
-    return replace(found, name=f"{output.name}{component}", unit=output.unit or found.unit)
+def _rename_quantity(quantity: LinearQuantity, output: Output, component: str) -> LinearQuantity:
+    return replace(quantity, name=f"{output.name}{component}", unit=output.unit or quantity.unit)
 
 
 @dataclass(frozen=True)
 class Rows:
     """Output rows along all speeds, by power of s, and direct feedthrough.
 
-    `orders` maps the power of s to rows (outputs, nu) of perturbations; `through` (outputs, inputs)
-    is the direct feedthrough.
+    `orders` maps the power of s to rows (outputs, nu) of perturbations; `feedthrough` (outputs,
+    inputs) is the direct feedthrough.
     """
 
     orders: dict[int, Array]
-    through: Array
+    feedthrough: Array
 
 
 def rows_of(
@@ -127,39 +141,44 @@ def rows_of(
 ) -> Rows:
     """Rows of outputs for some inputs."""
     nu, shape = linear.model.nu, (len(outputs), linear.model.nu)
-    parts = [(k, part) for k, one in enumerate(outputs) for part in one.parts]
+    parts = [(k, part) for k, quantity in enumerate(outputs) for part in quantity.parts]
     orders = {part.order: np.zeros(shape) for _, part in parts}
-    reach = [part.push for _, part in parts if part.push is not None]
-    distinct = {one: k for k, one in enumerate(dict.fromkeys(reach))}
-    reached = columns(linear.tree, linear.state, list(distinct), list(range(nu)))
+    reach = [part.channel for _, part in parts if part.channel is not None]
+    distinct = {reached: k for k, reached in enumerate(dict.fromkeys(reach))}
+    reached = columns(linear.open_tree, linear.state, list(distinct), list(range(nu)))
     for k, part in parts:
         row = orders[part.order][k]
-        if part.push is not None:
-            row += part.factor * reached[:, distinct[part.push]]
-        for place, number in part.speeds:
-            row[place] += part.factor * number
+        if part.channel is not None:
+            row += part.factor * reached[:, distinct[part.channel]]
+        for index, number in part.speeds:
+            row[index] += part.factor * number
     through = np.zeros((len(outputs), len(pushes)))
-    places = {one.name: j for j, one in enumerate(pushes)}
-    for k, one in enumerate(outputs):
-        for name, slope in one.through:
-            if name in places:
-                through[k, places[name]] += slope
-    if linear.mechanism is not None:
-        drives = {speed for one in pushes for speed, _ in one.moves} | {*linear.drives}
-        orders = linear.mechanism.rows(linear.state, orders, drives)
-    orders = _with_turning(linear, orders)
-    if linear.carrying is not None:
-        orders = linear.carrying.rows(orders, list(linear.free))
+    column_by_input = {channel.name: j for j, channel in enumerate(pushes)}
+    for k, quantity in enumerate(outputs):
+        for name, slope in quantity.feedthrough:
+            if name in column_by_input:
+                through[k, column_by_input[name]] += slope
+    if linear.constrained_motion is not None:
+        drives = {speed for channel in pushes for speed, _ in channel.drive_factors} | {
+            *linear.drive_indices
+        }
+        orders = linear.constrained_motion.rows(linear.state, orders, drives)
+    orders = _with_rate_matrix(linear, orders)
+    if linear.frame_transform is not None:
+        orders = linear.frame_transform.rows(orders, list(linear.free_speed_indices))
     return Rows(orders, through)
 
 
-def _with_turning(linear: LinearEquations, orders: dict[int, Array]) -> dict[int, Array]:
+def _with_rate_matrix(linear: LinearEquations, orders: dict[int, Array]) -> dict[int, Array]:
     """Rows of x from rows of speeds, where x' = G x + du: du = x' - G x, da = x'' - G x'."""
-    if linear.turning is None:
+    if linear.rate_matrix is None:
         return orders
-    free, found = list(linear.free), {order: rows.copy() for order, rows in orders.items()}
+    free, rows_found = (
+        list(linear.free_speed_indices),
+        {order: rows.copy() for order, rows in orders.items()},
+    )
     for order, rows in orders.items():
         if order:
-            lower = found.setdefault(order - 1, np.zeros_like(rows))
-            lower[:, free] -= rows[:, free] @ linear.turning
-    return found
+            lower = rows_found.setdefault(order - 1, np.zeros_like(rows))
+            lower[:, free] -= rows[:, free] @ linear.rate_matrix
+    return rows_found

@@ -17,12 +17,12 @@ from ..input_channels import Channel
 class Part:
     """Term of a linearised quantity: `factor` times s to the power `order` times a row.
 
-    The row is given by entries (index, value) of `speeds`, or is the effort column of `push`.
+    The row is given by entries (index, value) of `speeds`, or is the effort column of `channel`.
     """
 
     order: int
     speeds: tuple[tuple[int, float], ...] = ()
-    push: Channel | None = None
+    channel: Channel | None = None
     factor: float = 1.0
 
 
@@ -30,15 +30,15 @@ class Part:
 class LinearQuantity:
     """Linearised quantity as a sum of `parts`.
 
-    `value` returns its value at the operating point; `through` lists direct feedthrough as (input,
-    factor).
+    `value` returns its value at the operating point; `feedthrough` lists direct feedthrough as
+    (input, factor).
     """
 
     name: str
     unit: str
     parts: tuple[Part, ...]
     value: Callable[[], float]
-    through: tuple[tuple[str, float], ...] = ()
+    feedthrough: tuple[tuple[str, float], ...] = ()
 
 
 def formula(
@@ -48,21 +48,21 @@ def formula(
 
     Raises SceneError where the expression is not differentiable there.
     """
-    seen = {one: read(one) for one in of.names}
-    numbers = {one: quantity.value() for one, quantity in seen.items()}
+    seen = {name: read(name) for name in of.names}
+    numbers = {name: quantity.value() for name, quantity in seen.items()}
     parts, through = list[Part](), list[tuple[str, float]]()
-    for one, slope in expression_derivatives(of, numbers.__getitem__).items():
+    for variable, slope in expression_derivatives(of, numbers.__getitem__).items():
         if not math.isfinite(slope):
             raise SceneError(
-                f'"{of.text}" has no slope by {one.text} at the state, where that is '
-                f"{numbers[one]:.6g}"
+                f'"{of.text}" has no finite derivative with respect to {variable.text} at this '
+                f"state, {variable.text} = {numbers[variable]:.6g}"
             )
-        parts += scaled(seen[one].parts, slope)
-        through += [(given, slope * x) for given, x in seen[one].through]
+        parts += scale_parts(seen[variable].parts, slope)
+        through += [(given, slope * x) for given, x in seen[variable].feedthrough]
     value = of.evaluate(numbers.__getitem__)
     return LinearQuantity(name, unit, tuple(parts), lambda: value, tuple(through))
 
 
-def scaled(parts: Sequence[Part], factor: float) -> Iterator[Part]:
+def scale_parts(parts: Sequence[Part], factor: float) -> Iterator[Part]:
     """Parts multiplied by `factor`."""
     return (replace(part, factor=factor * part.factor) for part in parts)

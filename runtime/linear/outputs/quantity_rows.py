@@ -30,7 +30,7 @@ from ...engine.observation_columns import (
 from ...packing.coordinate_layout import HingeSlots
 from ...result.sources.springs import SPRING_QUANTITIES, length_and_rate
 from ..input_channels import Channel
-from .output_rows import LinearQuantity, Part, formula, scaled
+from .output_rows import LinearQuantity, Part, formula, scale_parts
 
 if TYPE_CHECKING:
     from ..linear_equations import LinearEquations
@@ -47,9 +47,9 @@ class QuantityLookup:
 
     def __init__(self, linear: LinearEquations) -> None:
         self._linear, self._state = linear, linear.state
-        self._model, self._layout = linear.model, linear.model.layout
+        self._model, self._layout = linear.model, linear.model.coordinate_layout
         self._ends = BodyReferences(linear.model.scene.skeleton)
-        self._springs = {one.name: k for k, one in enumerate(linear.model.scene.spring)}
+        self._springs = {spring.name: k for k, spring in enumerate(linear.model.scene.spring)}
 
     def read(self, name: Name) -> LinearQuantity:
         """Quantity of a name in an expression; the time t is constant."""
@@ -62,16 +62,17 @@ class QuantityLookup:
 
         Raises SceneError with the closest known name if linear models have no such quantity.
         """
-        found = self.find(name)
-        if found is None:
-            coordinates = self._linear.coordinates or ("shoulder.angle",)
-            outputs = (one.name for one in self._model.scene.output)
+        quantity = self.find(name)
+        if quantity is None:
+            coordinates = self._linear.coordinate_names or ("shoulder.angle",)
+            outputs = (output.name for output in self._model.scene.output)
             raise SceneError(
                 f'"{name}": expected a coordinate such as "{coordinates[0]}", its rate, a motion '
-                'of a body or end such as "boom.tip.position.x" or "boom.tip.vx", what a spring '
-                f"does, or an output of the scene{did_you_mean(name, (*outputs, *self.known()))}"
+                'of a body or end such as "boom.tip.position.x" or "boom.tip.vx", a quantity '
+                "of a spring, or an output of the scene"
+                f"{did_you_mean(name, (*outputs, *self.known_names()))}"
             )
-        return found
+        return quantity
 
     def find(self, name: str) -> LinearQuantity | None:
         """Quantity of a name; None if linear models have no such quantity.
@@ -82,16 +83,16 @@ class QuantityLookup:
         if name in self._model.scene.channels:
             return self._input(name)
         if owner in self._layout.hinges:
-            found = self._of_hinge(self._layout.hinges[owner], last)
-            if found is not None:
-                return found
+            quantity = self._hinge_quantity(self._layout.hinges[owner], last)
+            if quantity is not None:
+                return quantity
         if owner in self._springs and last in SPRING_QUANTITIES:
-            return self._of_spring(self._springs[owner], last)
-        return self._of_end(name, owner, last)
+            return self._spring_quantity(self._springs[owner], last)
+        return self._end_quantity(name, owner, last)
 
-    def known(self) -> Iterator[str]:
+    def known_names(self) -> Iterator[str]:
         """Known names, coordinates first."""
-        yield from self._linear.coordinates
+        yield from self._linear.coordinate_names
         yield from self._model.scene.channels
         yield from (f"{spring}.{kind}" for spring in self._springs for kind in SPRING_QUANTITIES)
         for slots in self._layout.hinges.values():
@@ -105,28 +106,32 @@ class QuantityLookup:
 
     def _input(self, name: str) -> LinearQuantity:
         scene, t = self._model.scene, self._state.t
-        inputs = {one.name: one.unit for one in scene.input}
-        unit = (inputs | {one.name: one.unit for one in scene.signal})[name]
+        inputs = {scene_input.name: scene_input.unit for scene_input in scene.input}
+        unit = (inputs | {signal.name: signal.unit for signal in scene.signal})[name]
         through = ((name, 1.0),) if name in inputs else ()
         return LinearQuantity(name, unit, (), lambda: scene.channels[name].value(t), through)
 
     # --- hinges -----------------------------------------------------------------------------------
 
-    def _of_hinge(self, slots: HingeSlots, last: str) -> LinearQuantity | None:
+    def _hinge_quantity(self, slots: HingeSlots, last: str) -> LinearQuantity | None:
         """Coordinate, rate or acceleration of a hinge, by name or index; None if unknown."""
         state = self._state
         for k, speed in enumerate(slots.u_names):
-            row, place = ((slots.u + k, 1.0),), slots.u + k
-            if last == f"{speed}_increment" and not slots.straight:
+            row, speed_index = ((slots.u + k, 1.0),), slots.u + k
+            if last == f"{speed}_increment" and not slots.rates_are_speeds:
                 unit = slots.u_units[k].removesuffix("/s")
                 return LinearQuantity(f"{slots.name}.{last}", unit, (Part(0, row),), lambda: 0.0)
             if last in _aliases(speed, "u", k, slots.nu):
                 unit, parts = slots.u_units[k], (Part(1, row),)
-                return LinearQuantity(f"{slots.name}.{speed}", unit, parts, _entry(state.u, place))
+                return LinearQuantity(
+                    f"{slots.name}.{speed}", unit, parts, _entry(state.u, speed_index)
+                )
             rate = acceleration_name(speed)
             if last in _aliases(rate, "udot", k, slots.nu):
                 unit, parts = rate_unit(slots.u_units[k]), (Part(2, row),)
-                return LinearQuantity(f"{slots.name}.{rate}", unit, parts, _entry(state.a, place))
+                return LinearQuantity(
+                    f"{slots.name}.{rate}", unit, parts, _entry(state.udot, speed_index)
+                )
         for k, (name, unit) in enumerate(zip(slots.q_names, slots.q_units, strict=True)):
             if last in _aliases(name, "q", k, slots.nq):
                 parts = (Part(0, self._follows(slots, k)),)
@@ -137,91 +142,92 @@ class QuantityLookup:
 
     def _follows(self, slots: HingeSlots, k: int) -> tuple[tuple[int, float], ...]:
         """Row (index, value) of coordinate k of a hinge along its speeds."""
-        if slots.straight:
+        if slots.rates_are_speeds:
             return ((slots.u + k, 1.0),)
         engine, state = self._model.looped, self._state
-        found = []
-        for place in range(slots.u, slots.u + slots.nu):
-            unit = np.eye(1, engine.nu, place)[0]
+        following = []
+        for speed_index in range(slots.u, slots.u + slots.nu):
+            unit = np.eye(1, engine.nu, speed_index)[0]
             rates = engine.rates(state.t, state.q, unit, engine.start_memory())
-            found.append((place, float(rates[slots.q + k])))
-        return tuple(found)
+            following.append((speed_index, float(rates[slots.q + k])))
+        return tuple(following)
 
     # --- ends -------------------------------------------------------------------------------------
 
-    def _of_end(self, name: str, owner: str, last: str) -> LinearQuantity | None:
+    def _end_quantity(self, name: str, owner: str, last: str) -> LinearQuantity | None:
         """Component of the motion of a body or end in inertial axes; None if unknown."""
         for kind, (push, order) in _KINDS.items():
             about, end = BODY_QUANTITIES[kind], owner.removesuffix(f".{kind}")
             for axis, short in enumerate(about.short):
                 long = end != owner and last == about.labels[axis]
                 if (long or (end == owner and last == short)) and end in self._ends:
-                    self._refuse_in_motion(name, order)
+                    self._check_at_rest(name, order)
                     end = self._ends.canonical(end) or end
-                    part = Part(order, push=Channel("", "", end=end, kind=push, axis=axis))
+                    part = Part(order, channel=Channel("", "", end=end, kind=push, axis=axis))
                     full = f"{end}.{kind}.{about.labels[axis]}"
                     return LinearQuantity(full, about.unit, (part,), self._number(end, kind, axis))
         return None
 
     def _number(self, end: str, kind: str, axis: int) -> Callable[[], float]:
         column = POINT_COLUMNS[kind].start + axis
-        return lambda: float(self._points([self._model.packed.end(end)])[0, column])
+        return lambda: float(self._points([self._model.packed_scene.end(end)])[0, column])
 
     def _points(self, ends: Sequence[tuple[int, tuple[float, ...], tuple[float, ...]]]) -> Array:
         """Motion (ends, 24) at the operating point; columns of `Observation.points`."""
         engine, state = self._model.looped, self._state
-        found = engine.observe(
+        observations = engine.observe(
             np.array([state.t]), state.q[None], state.u[None], engine.start_memory()[None],
             [Probe(*end) for end in ends], parts=("points",),
         )  # fmt: skip
-        return found.points[0]
+        return observations.points[0]
 
-    def _refuse_in_motion(self, name: str, order: int) -> None:
+    def _check_at_rest(self, name: str, order: int) -> None:
         if order and self._state.u.any():
             raise SceneError(
-                f'"{name}": the state moves, so that places change what speeds of ends are; ask '
-                "for coordinates, their rates or positions there"
+                f'"{name}": at a moving state velocities of ends depend on the configuration; use '
+                "coordinates, their rates or positions"
             )
 
     # --- springs ----------------------------------------------------------------------------------
 
-    def _of_spring(self, number: int, kind: str) -> LinearQuantity:
+    def _spring_quantity(self, number: int, kind: str) -> LinearQuantity:
         spring = self._model.scene.spring[number]
         name = f"{spring.name}.{kind}"
         if kind != "length":
-            self._refuse_in_motion(name, 1)
+            self._check_at_rest(name, 1)
         push = Channel("", "", spring=number)
         if kind != "effort":
             order = 0 if kind == "length" else 1
-            parts = (Part(order, push=push),)
+            parts = (Part(order, channel=push),)
             return LinearQuantity(
                 name, SPRING_QUANTITIES[kind].unit, parts, lambda: self._motion(number)[order]
             )
         if spring.type != "spring":
             raise SceneError(
-                f'"{name}": its law is that of a force element "{spring.type}", whose slopes are '
-                f"not known here; ask for {spring.name}.length"
+                f'"{name}": the law of force element type "{spring.type}" has no derivatives '
+                f"here; use {spring.name}.length"
             )
         return self._effort(name, spring.law, number)
 
     def _motion(self, number: int) -> tuple[float, float]:
         """Length of a spring, m, and its rate, m/s."""
-        near, far = self._points(self._model.packed.system.forces[number].ends)
+        near, far = self._points(self._model.packed_scene.system.forces[number].ends)
         length, rate = length_and_rate((far - near)[None, :6])
         return float(length[0]), float(rate[0])
 
     def _effort(self, name: str, law: SpringLaw, number: int) -> LinearQuantity:
         """Effort of a spring: stiffness, damping and its effort expression."""
-        length, rate = (self._of_spring(number, kind) for kind in ("length", "length_rate"))
+        length, rate = (self._spring_quantity(number, kind) for kind in ("length", "length_rate"))
 
-        def read(one: Name) -> LinearQuantity:
-            if not one.hinge and one.quantity in ("q", "u"):
-                return length if one.quantity == "q" else rate
-            return self.read(one)
+        def read(expression_name: Name) -> LinearQuantity:
+            if not expression_name.hinge and expression_name.quantity in ("q", "u"):
+                return length if expression_name.quantity == "q" else rate
+            return self.read(expression_name)
 
         given = formula(law.effort, name, SPRING_QUANTITIES["effort"].unit, read)
         springs, damps = (
-            scaled(one.parts, -x) for one, x in ((length, law.stiffness), (rate, law.damping))
+            scale_parts(quantity.parts, -x)
+            for quantity, x in ((length, law.stiffness), (rate, law.damping))
         )
 
         def value() -> float:
@@ -236,5 +242,5 @@ def _aliases(name: str, short: str, k: int, count: int) -> tuple[str, ...]:
     return (name, f"{short}[{k}]", short) if count == 1 else (name, f"{short}[{k}]")
 
 
-def _entry(values: Array, place: int) -> Callable[[], float]:
-    return lambda: float(values[place])
+def _entry(values: Array, index: int) -> Callable[[], float]:
+    return lambda: float(values[index])

@@ -23,7 +23,7 @@ def figure(height: float = 4.5, width: float = 7.5) -> Any:
     return figure_class()(figsize=(width, height), layout="constrained")
 
 
-def write(made: Any, path: str | Path | None) -> None:
+def write(drawing: Any, path: str | Path | None) -> None:
     """Save the figure as .png, .svg or .pdf, by file extension; do nothing if `path` is None.
 
     Raises SceneError for another extension.
@@ -34,13 +34,13 @@ def write(made: Any, path: str | Path | None) -> None:
     if path.suffix.lower() not in _FORMATS:
         raise SceneError(f'picture "{path}": expected a name ending in {", ".join(_FORMATS)}')
     with replace_atomically(path) as temporary:
-        made.savefig(temporary, dpi=150, format=path.suffix[1:].lower())
+        drawing.savefig(temporary, dpi=150, format=path.suffix[1:].lower())
 
 
-def refuse_none(values: NDArray[Any]) -> None:
+def require_columns(values: NDArray[Any]) -> None:
     """Raise SceneError if `values` has no column to draw."""
     if not values.shape[1]:
-        raise SceneError("nothing moves in this scene, so that there is nothing to draw")
+        raise SceneError("nothing to draw: the scene has no degrees of freedom")
 
 
 def finish_axes(*axes: Any) -> None:

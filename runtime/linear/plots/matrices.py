@@ -9,7 +9,7 @@ import numpy as np
 
 from mstmm.array_validation import Array
 
-from .figure import figure, refuse_none, write
+from .figure import figure, require_columns, write
 
 if TYPE_CHECKING:
     from ..state_space import StateSpace
@@ -27,30 +27,32 @@ def matrices(linear: StateSpace, path: str | Path | None) -> Any:
 
     Each matrix has its own colour scale, logarithmic in both signs.
     """
-    drawn, names = ("MCK", linear.coordinates) if linear.has_stiffness else ("A", linear.states)
-    refuse_none(getattr(linear, drawn[0]))
+    drawn, names = (
+        ("MCK", linear.coordinate_names) if linear.has_stiffness else ("A", linear.state_names)
+    )
+    require_columns(getattr(linear, drawn[0]))
     named = len(names) <= _NAMED
     side = float(np.clip(0.2 * len(names), 2.4, 6.0)) if named else 4.0
-    made = figure(side + 1.6, len(drawn) * side + 2.4)
-    panels = made.subplots(1, len(drawn), sharey=True, squeeze=False)[0]
+    drawing = figure(side + 1.6, len(drawn) * side + 2.4)
+    panels = drawing.subplots(1, len(drawn), sharey=True, squeeze=False)[0]
     for panel, name in zip(panels, drawn, strict=True):
         matrix = getattr(linear, name)
-        _map(made, panel, matrix)
+        _map(drawing, panel, matrix)
         panel.set_title(name if matrix.any() else f"{name} = 0", fontsize=11)
         if named:
             panel.set_xticks(range(len(names)), names, rotation=90, fontsize=7)
             panel.set_yticks(range(len(names)), names, fontsize=7)
         panel.set_xlabel(_unit(linear, name), fontsize=8)
         panel.tick_params(length=0)
-    write(made, path)
-    return made
+    write(drawing, path)
+    return drawing
 
 
 def _unit(linear: StateSpace, name: str) -> str:
     """Unit of the entries; for coordinates of several units, that of the rows."""
     if name == "A":
         return "rates of rows per column"
-    units = set(linear.units)
+    units = set(linear.coordinate_units)
     if len(units) > 1:
         return "rows in N or N*m"
     per = {"M": "/s^2", "C": "/s", "K": ""}[name]
@@ -58,7 +60,7 @@ def _unit(linear: StateSpace, name: str) -> str:
     return f"{'N' if unit == 'm' else 'N*m'} per {unit}{per}"
 
 
-def _map(made: Any, panel: Any, matrix: Array) -> None:
+def _map(drawing: Any, panel: Any, matrix: Array) -> None:
     """Draw entries as colours on a symmetric logarithmic scale.
 
     The colour map is "RdBu_r": positive entries are red, negative ones blue.
@@ -70,7 +72,7 @@ def _map(made: Any, panel: Any, matrix: Array) -> None:
     scale = SymLogNorm(_SMALL * top, linscale=0.5, vmin=-top, vmax=top)
     drawn = panel.imshow(matrix, cmap="RdBu_r", norm=scale, interpolation="none")
     panel.spines[:].set_visible(False)
-    bar = made.colorbar(drawn, ax=panel, location="bottom", shrink=0.9, pad=0.02)
+    bar = drawing.colorbar(drawn, ax=panel, location="bottom", shrink=0.9, pad=0.02)
     inner = top * _INNER
     bar.set_ticks([-top, -inner, 0, inner, top])
     bar.set_ticklabels([f"{x:.2g}" for x in (-top, -inner, 0, inner, top)])

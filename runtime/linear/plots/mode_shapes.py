@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mstmm.array_validation import Array
 
-from .figure import figure, finish_axes, refuse_none, write
+from .figure import figure, finish_axes, require_columns, write
 from .wireframe import Outline, deformed_outlines
 
 if TYPE_CHECKING:
@@ -41,30 +41,30 @@ def shapes(
     path: str | Path | None,
 ) -> Any:
     """Plot a panel for each mode of `which`: the scene at rest (grey, dashed) and displaced."""
-    refuse_none(shapes)
+    require_columns(shapes)
     columns = min(3, len(which)) if len(which) != 4 else 2
     rows = -(-len(which) // columns)
-    made = figure(2.6 * rows + 0.3, 3.4 * columns if columns > 1 else 5.0)
-    panels = made.subplots(rows, columns, squeeze=False).ravel()
+    drawing = figure(2.6 * rows + 0.3, 3.4 * columns if columns > 1 else 5.0)
+    panels = drawing.subplots(rows, columns, squeeze=False).ravel()
     rest, moved = deformed_outlines(linear, np.real(shapes[:, list(which)]), _PART)
-    for panel, k, one in zip(panels, which, moved, strict=False):
-        _panel(panel, rest, one)
-        panel.set_title(f"{k + 1}: {described(complex(eigenvalues[k]))}", fontsize=9)
+    for panel, k, outline in zip(panels, which, moved, strict=False):
+        _panel(panel, rest, outline)
+        panel.set_title(f"{k + 1}: {eigenvalue_text(complex(eigenvalues[k]))}", fontsize=9)
     for panel in panels[len(which) :]:
         panel.set_visible(False)
-    write(made, path)
-    return made
+    write(drawing, path)
+    return drawing
 
 
-def described(value: complex) -> str:
+def eigenvalue_text(value: complex) -> str:
     """Text of frequency and damping ratio, or of growth rate, for an eigenvalue, 1/s."""
     if value == 0:
-        return "0 Hz, moves freely"
+        return "0 Hz, unrestrained"
     if value.imag == 0:
-        return f"{'grows' if value.real > 0 else 'decays'} with {abs(value.real):.4g} 1/s"
+        return f"{'growth' if value.real > 0 else 'decay'} rate {abs(value.real):.4g} 1/s"
     text = f"{value.imag / (2 * np.pi):.4g} Hz"
     if value.real > 0:
-        return f"{text}, grows with {value.real:.3g} 1/s"
+        return f"{text}, growth rate {value.real:.3g} 1/s"
     return text + (f", damping {-value.real / abs(value):.2%}" if value.real else "")
 
 
@@ -74,7 +74,7 @@ def _panel(axis: Any, rest: Outline, moved: Outline) -> None:
     _draw(axis, moved, (across, up), _BLUE, "-", 1.6)
     axis.plot(rest.ground[:, across], rest.ground[:, up], "^", color="0.2", ms=6, zorder=4)
     if not np.abs(moved.points - rest.points).max(initial=0):
-        axis.text(0.5, 0.03, "turns about its own axis", transform=axis.transAxes, ha="center",
+        axis.text(0.5, 0.03, "rotation about its own axis", transform=axis.transAxes, ha="center",
                   fontsize=8, color="0.4")  # fmt: skip
     axis.set_aspect("equal", adjustable="datalim")
     axis.margins(0.08)
@@ -115,25 +115,25 @@ def _plane(rest: Array, moved: Array) -> tuple[int, int]:
     moves = np.abs(moved - rest).max(axis=0)
     reach = np.ptp(rest, axis=0)
     first = int(np.argmax(moves)) if moves.any() else int(np.argmax(reach))
-    others = [k for k in range(3) if k != first]
-    second = max(others, key=lambda k: (round(reach[k], 12), moves[k]))
+    other_axes = [k for k in range(3) if k != first]
+    second = max(other_axes, key=lambda k: (round(reach[k], 12), moves[k]))
     low, high = sorted((first, second))
     return low, high
 
 
 def eigenvalues(values: Complex, path: str | Path | None) -> Any:
     """Plot eigenvalues in the complex plane; unstable ones are red."""
-    refuse_none(values[None])
-    made = figure(5.0)
-    axis = made.subplots()
+    require_columns(values[None])
+    drawing = figure(5.0)
+    axis = drawing.subplots()
     growing = values.real > 0
     for some, colour in ((~growing, _BLUE), (growing, _RED)):
         axis.plot(values[some].real, values[some].imag, "x", color=colour, ms=7, mew=1.6)
     wide = _spread(values.imag) > _SPREAD
-    (_by_decades if wide else _widened)(axis, values.real, values.imag)
-    for k in _apart(axis, values[:_NUMBERED]):
-        place = values[k].real, values[k].imag
-        axis.annotate(str(k + 1), place, xytext=(6, 3), fontsize=8, textcoords="offset points",
+    (_use_log_axes if wide else _widen_limits)(axis, values.real, values.imag)
+    for k in _separate_indices(axis, values[:_NUMBERED]):
+        position = values[k].real, values[k].imag
+        axis.annotate(str(k + 1), position, xytext=(6, 3), fontsize=8, textcoords="offset points",
                       color="0.35")  # fmt: skip
     if (values.real < 0).any():
         _rays(axis, _decade_below(values.imag[values.imag > 0]) if wide else 0.0)
@@ -141,8 +141,8 @@ def eigenvalues(values: Complex, path: str | Path | None) -> Any:
     axis.set_xlabel("growth in 1/s")
     axis.set_ylabel("angular frequency in rad/s")
     finish_axes(axis)
-    write(made, path)
-    return made
+    write(drawing, path)
+    return drawing
 
 
 def _spread(imaginary: Array) -> float:
@@ -151,7 +151,7 @@ def _spread(imaginary: Array) -> float:
     return float(positive.max() / positive.min()) if len(positive) else 1.0
 
 
-def _by_decades(axis: Any, real: Array, imaginary: Array) -> None:
+def _use_log_axes(axis: Any, real: Array, imaginary: Array) -> None:
     """Make both axes logarithmic, but linear below the decade of the smallest value."""
     slowest, least = _decade_below(imaginary[imaginary > 0]), _decade_below(np.abs(real[real != 0]))
     axis.set_xscale("symlog", linthresh=least)
@@ -165,7 +165,7 @@ def _decade_below(numbers: Array) -> float:
     return float(10.0 ** np.floor(np.log10(numbers.min(initial=1.0))))
 
 
-def _widened(axis: Any, real: Array, imaginary: Array) -> None:
+def _widen_limits(axis: Any, real: Array, imaginary: Array) -> None:
     """Set axis limits that include the imaginary axis."""
     top = max(float(imaginary.max(initial=0)), 0.0) or 1.0
     left, right = min(float(real.min()), 0.0), max(float(real.max()), 0.0)
@@ -174,14 +174,14 @@ def _widened(axis: Any, real: Array, imaginary: Array) -> None:
     axis.set_ylim(-0.04 * top, 1.08 * top)
 
 
-def _apart(axis: Any, values: Complex) -> list[int]:
+def _separate_indices(axis: Any, values: Complex) -> list[int]:
     """Indices of eigenvalues that do not overlap an earlier one in the plot."""
-    places = (axis.transScale + axis.transLimits).transform(
+    positions = (axis.transScale + axis.transLimits).transform(
         np.column_stack([values.real, values.imag])
     )
     kept: list[int] = []
-    for k, place in enumerate(places):
-        if all(np.abs(place - places[j]).max() > _CLOSE for j in kept):
+    for k, position in enumerate(positions):
+        if all(np.abs(position - positions[j]).max() > _CLOSE for j in kept):
             kept.append(k)
     return kept
 

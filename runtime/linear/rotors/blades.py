@@ -77,32 +77,34 @@ def find_blades(linear: LinearEquations) -> list[Blades]:
     """Groups of equal branches on spinning hubs, equally spaced about the spin axis."""
     packed = linear.model.looped.packed
     points = _mass_centres(linear)
-    found: list[Blades] = []
+    blade_groups: list[Blades] = []
     for hub, link in enumerate(packed.topology.links):
         by_form: dict[tuple[object, ...], list[_Branch]] = {}
         for child in link.children if len(link.children) >= _FEWEST else ():
             branch = _branch(linear, packed, child)
             if branch.coordinates:
                 by_form.setdefault(branch.form, []).append(branch)
-        groups = (_arranged(points, hub, group) for group in by_form.values())
-        found += [group for group in groups if group is not None]
-    return found
+        groups = (_arrange_blades(points, hub, group) for group in by_form.values())
+        blade_groups += [group for group in groups if group is not None]
+    return blade_groups
 
 
 def _branch(linear: LinearEquations, packed: PackedScene, root: int) -> _Branch:
     """Branch outboard from body `root`; its form lists hinges and free perturbations in order."""
     bodies, coordinates, form = [], list[int](), list[object]()
-    places = {speed: k for k, speed in enumerate(linear.free)}
-    for place in _outwards(packed, root):
-        bodies.append(place)
-        body, hinge = packed.topology.at(place)
+    row_by_speed = {speed: k for k, speed in enumerate(linear.free_speed_indices)}
+    for tree_index in _outwards(packed, root):
+        bodies.append(tree_index)
+        body, hinge = packed.topology.scene_indices(tree_index)
         of_hinge = packed.layout.hinges.get(packed.scene.hinges[hinge].name)
         of_body = packed.layout.modal.get(packed.scene.bodies.name(body))
         for slots in (of_hinge, of_body):
-            free = [] if slots is None else [k for k in range(slots.nu) if slots.u + k in places]
+            free = (
+                [] if slots is None else [k for k in range(slots.nu) if slots.u + k in row_by_speed]
+            )
             form.append((None if slots is None else slots.type, tuple(free)))
-            coordinates += [places[slots.u + k] for k in free] if slots is not None else []
-        form.append(len(packed.topology.links[place].children))
+            coordinates += [row_by_speed[slots.u + k] for k in free] if slots is not None else []
+        form.append(len(packed.topology.links[tree_index].children))
     return _Branch(tuple(bodies), tuple(coordinates), tuple(form))
 
 
@@ -110,9 +112,9 @@ def _outwards(packed: PackedScene, root: int) -> Iterator[int]:
     """Tree indices of a body and all bodies outboard of it, depth first."""
     waiting = [root]
     while waiting:
-        place = waiting.pop()
-        yield place
-        waiting += reversed(packed.topology.links[place].children)
+        tree_index = waiting.pop()
+        yield tree_index
+        waiting += reversed(packed.topology.links[tree_index].children)
 
 
 def _mass_centres(linear: LinearEquations) -> Array:
@@ -125,7 +127,7 @@ def _mass_centres(linear: LinearEquations) -> Array:
     return np.asarray(engine.observe(*of, probes, parts=("points",)).points[0])
 
 
-def _arranged(points: Array, hub: int, group: list[_Branch]) -> Blades | None:
+def _arrange_blades(points: Array, hub: int, group: list[_Branch]) -> Blades | None:
     """Branches ordered by azimuth about the spin axis of the hub; None if not equally spaced."""
     spin = points[hub, POINT_COLUMNS["angular_velocity"]]
     speed = float(np.linalg.norm(spin))
@@ -134,7 +136,7 @@ def _arranged(points: Array, hub: int, group: list[_Branch]) -> Blades | None:
     axis = spin / speed
     across = np.linalg.svd(axis[None])[2][1:]
     across[1] = np.cross(axis, across[0])
-    means = np.array([points[list(one.bodies), :3].mean(axis=0) for one in group])
+    means = np.array([points[list(branch.bodies), :3].mean(axis=0) for branch in group])
     plane = (means - means.mean(axis=0)) @ (across.T @ [1, 1j])
     radius, order = np.abs(plane), np.argsort(np.angle(plane))
     steps = np.angle(plane[np.roll(order, -1)] / plane[order]) if radius.all() else np.zeros(1)

@@ -32,11 +32,11 @@ def displacements(linear: LinearEquations, state: State) -> Array:
     velocity.  Rotations are multiplied by the characteristic length of the scene.
     """
     length = scene_length(linear.model)
-    points = _points(linear, state, linear.spread(np.eye(len(linear))).T)
-    place, velocity, spin = (points[..., POINT_COLUMNS[kind]] for kind in _KINDS)
+    points = _points(linear, state, linear.expand(np.eye(len(linear))).T)
+    position, velocity, spin = (points[..., POINT_COLUMNS[kind]] for kind in _KINDS)
     centre = state.t * _drift(linear)
-    found = np.concatenate([velocity + np.cross(spin, centre - place), length * spin], axis=1)
-    return np.asarray(found.reshape(len(linear), -1).T)
+    rows = np.concatenate([velocity + np.cross(spin, centre - position), length * spin], axis=1)
+    return np.asarray(rows.reshape(len(linear), -1).T)
 
 
 def whirl(linear: LinearEquations, shapes: NDArray[Any]) -> Array:
@@ -46,7 +46,7 @@ def whirl(linear: LinearEquations, shapes: NDArray[Any]) -> Array:
     and 0 is motion in a plane or along the axis.  Blades enter by the sum of their displacements,
     which is that of their common mass centre.
     """
-    axis = _spin(linear)
+    axis = _spin_axis(linear)
     rows = (displacements(linear, linear.state) @ shapes).reshape(2, -1, 3, shapes.shape[1])
     summed = _sum_of_blades(linear, rows).reshape(-1, 3, shapes.shape[1])
     turned = np.cross(np.conj(summed), summed, axis=1).imag
@@ -62,16 +62,16 @@ def _sum_of_blades(linear: LinearEquations, rows: NDArray[Any]) -> NDArray[Any]:
     if not linear.state.u.any():
         return rows
     blades, bodies = find_blades(linear), _bodies_of_points(linear)
-    same = {int(body): int(one.bodies[0, k]) for one in blades
-            for k, others in enumerate(one.bodies.T) for body in others}  # fmt: skip
+    same = {int(body): int(group.bodies[0, k]) for group in blades
+            for k, bodies in enumerate(group.bodies.T) for body in bodies}  # fmt: skip
     visits: dict[int, int] = {}
-    places: dict[tuple[int, int], int] = {}
-    found = np.zeros_like(rows)
+    row_by_branch: dict[tuple[int, int], int] = {}
+    summed_rows = np.zeros_like(rows)
     for k, body in enumerate(bodies):
         visits[body] = visits.get(body, -1) + 1
         key = same.get(body, body), visits[body]
-        found[:, places.setdefault(key, len(places))] += rows[:, k]
-    return found[:, : len(places)]
+        summed_rows[:, row_by_branch.setdefault(key, len(row_by_branch))] += rows[:, k]
+    return summed_rows[:, : len(row_by_branch)]
 
 
 _KINDS = "position", "velocity", "angular_velocity"
@@ -82,8 +82,8 @@ def _points(linear: LinearEquations, state: State, speeds: Array) -> Array:
 
     The points are the frames of all bodies, the ends of flexible bodies and the sections of beams.
     """
-    packed, engine = linear.model.looped.packed, linear.model.looped.inertia_alone
-    bodies, flexible = linear.model.scene.skeleton.bodies, linear.model.flexible
+    packed, engine = linear.model.looped.packed, linear.model.looped.inertia_only
+    bodies, flexible = linear.model.scene.skeleton.bodies, linear.model.flexible_bodies
     names = [bodies.name(k) for k in range(len(bodies))]
     probes = [Probe(*packed.end(name)) for name in names]
     for name in flexible:
@@ -94,25 +94,25 @@ def _points(linear: LinearEquations, state: State, speeds: Array) -> Array:
     points = engine.observe(*of, memory, probes, parts=("points",)).points
     beams = _beams(linear)
     frames = [points[:, names.index(name)] for name in beams]
-    slots = [linear.model.layout.modal[name].u_slice for name in beams]
-    along = [_sections(body, frame, speeds[:, place])
-             for body, frame, place in zip(beams.values(), frames, slots, strict=True)]  # fmt: skip
+    slots = [linear.model.coordinate_layout.modal[name].u_slice for name in beams]
+    along = [_sections(body, frame, speeds[:, slot])
+             for body, frame, slot in zip(beams.values(), frames, slots, strict=True)]  # fmt: skip
     return np.concatenate([points, *along], axis=1)
 
 
 def _bodies_of_points(linear: LinearEquations) -> list[int]:
     """Tree indices of the bodies of all `_points`."""
     end, bodies = linear.model.looped.packed.end, linear.model.scene.skeleton.bodies
-    found = [end(bodies.name(k))[0] for k in range(len(bodies))]
-    for name in linear.model.flexible:
-        found += [end(name)[0]] * len(bodies.ends(name) or ())
+    owners = [end(bodies.name(k))[0] for k in range(len(bodies))]
+    for name in linear.model.flexible_bodies:
+        owners += [end(name)[0]] * len(bodies.ends(name) or ())
     for name, body in _beams(linear).items():
-        found += [end(name)[0]] * len(_stations(body))
-    return found
+        owners += [end(name)[0]] * len(_stations(body))
+    return owners
 
 
 def _beams(linear: LinearEquations) -> dict[str, ModalBody]:
-    flexible = linear.model.flexible
+    flexible = linear.model.flexible_bodies
     return {name: body for name, body in flexible.items() if body.shapes is not None}
 
 
@@ -131,17 +131,17 @@ def _sections(body: ModalBody, frame: Array, rates: Array) -> Array:
     shapes = body.shapes
     assert shapes is not None
     x = _stations(body)
-    values, rotation = shapes.at(x), frame[:, 15:24].reshape(-1, 1, 3, 3)
-    found = np.repeat(frame[:, None], len(x), axis=1)
+    values, rotation = shapes.values_at(x), frame[:, 15:24].reshape(-1, 1, 3, 3)
+    sections = np.repeat(frame[:, None], len(x), axis=1)
     arm = rotation[..., 0] * x[:, None]
     velocity, spin = POINT_COLUMNS["velocity"], POINT_COLUMNS["angular_velocity"]
     for columns, field in ((velocity, values.phi), (spin, values.theta)):
         own = np.einsum("xik,mk->mxi", field, rates)
-        found[..., columns] += np.einsum("mxij,mxj->mxi", np.broadcast_to(
+        sections[..., columns] += np.einsum("mxij,mxj->mxi", np.broadcast_to(
             rotation, (len(frame), len(x), 3, 3)), own)  # fmt: skip
-    found[..., velocity] += np.cross(frame[:, None, spin], arm)
-    found[..., POINT_COLUMNS["position"]] += arm
-    return found
+    sections[..., velocity] += np.cross(frame[:, None, spin], arm)
+    sections[..., POINT_COLUMNS["position"]] += arm
+    return sections
 
 
 def _drift(linear: LinearEquations) -> Array:
@@ -167,7 +167,7 @@ def angular_velocity(linear: LinearEquations, name: str) -> Array:
     return np.asarray(points[0, 0, POINT_COLUMNS["angular_velocity"]])
 
 
-def _spin(linear: LinearEquations) -> Array:
+def _spin_axis(linear: LinearEquations) -> Array:
     """Unit vector (3,) of the largest angular velocity of a body; the x axis without spin."""
     turns = _points(linear, linear.state, linear.state.u[None])[
         0, :, POINT_COLUMNS["angular_velocity"]

@@ -26,9 +26,9 @@ from mstmm.errors import SceneError
 from mstmm.safe_text import abbreviate_names
 
 from .blades import find_blades
-from .carrying import Carrying
 from .displacements import displacements
-from .later import SAME, ahead, later
+from .frame_transform import FrameTransform
+from .later_equations import SAME, ahead, later
 
 if TYPE_CHECKING:
     from ..linear_equations import LinearEquations
@@ -45,13 +45,13 @@ def frame_of(linear: LinearEquations) -> str:
 
 
 def _is_rotating(linear: LinearEquations) -> bool:
-    if linear.carrying is not None or not len(linear) or not linear.state.u.any():
+    if linear.frame_transform is not None or not len(linear) or not linear.state.u.any():
         return False
     now, then = (displacements(linear, state) for state in (linear.state, ahead(linear)))
     return bool(np.abs(then - now).max() > _ALIKE * np.abs(now).max(initial=0))
 
 
-def carrying_at(linear: LinearEquations) -> Carrying:
+def fixed_frame_transform(linear: LinearEquations) -> FrameTransform:
     """Transformation to the fixed frame at the operating point of a linear model.
 
     Raises SceneError with the reason where the rotor is not axisymmetric.
@@ -59,52 +59,56 @@ def carrying_at(linear: LinearEquations) -> Carrying:
     there = later(linear)
     dt = there.state.t - linear.state.t
     blades, rates = find_blades(linear), np.zeros((len(linear), len(linear)))
-    others = np.ones(len(linear), dtype=bool)
+    is_outside_blades = np.ones(len(linear), dtype=bool)
     for group in blades:
-        others[group.coordinates] = False
-        for places in group.coordinates.T:
-            rates[np.ix_(places, places)] = group.rates
-    if others.any():
-        turned = _turned(linear, there, np.flatnonzero(others))
-        rates[np.ix_(others, others)] = np.real(logm(turned)) / dt
+        is_outside_blades[group.coordinates] = False
+        for blade_columns in group.coordinates.T:
+            rates[np.ix_(blade_columns, blade_columns)] = group.rates
+    if is_outside_blades.any():
+        turned = _later_rotation(linear, there, np.flatnonzero(is_outside_blades))
+        rates[np.ix_(is_outside_blades, is_outside_blades)] = np.real(logm(turned)) / dt
     rates[np.abs(rates) < _ROUNDING * np.abs(rates).max(initial=0)] = 0.0
-    carrying = Carrying(np.eye(len(linear)), rates)
-    _refuse_asymmetric(replace(linear, carrying=carrying))
+    carrying = FrameTransform(np.eye(len(linear)), rates)
+    _check_constant_matrices(replace(linear, frame_transform=carrying))
     return carrying
 
 
-def _turned(linear: LinearEquations, there: LinearEquations, others: Integers) -> Array:
-    """T (m, m) at the later state `there`, for the perturbations `others` (m,) outside blades."""
-    now = displacements(linear, linear.state)[:, others]
-    then = displacements(there, there.state)[:, others]
+def _later_rotation(
+    linear: LinearEquations, there: LinearEquations, perturbations: Integers
+) -> Array:
+    """T (m, m) at the later state `there`, for `perturbations` (m,) outside blades."""
+    now = displacements(linear, linear.state)[:, perturbations]
+    then = displacements(there, there.state)[:, perturbations]
     size = np.linalg.norm(now, axis=0)
     unit = now / np.where(size > 0, size, 1.0)
     singular = np.linalg.svd(unit, compute_uv=False)
     if not size.all() or singular.min(initial=np.inf) < _SEEN * singular.max(initial=0):
         raise _no_frame("displacements of its bodies' ends do not determine its coordinates")
-    found = np.linalg.lstsq(unit, then, rcond=None)[0]
-    left = np.abs(unit @ found - then).max(axis=0) / np.linalg.norm(then, axis=0)
+    rotation = np.linalg.lstsq(unit, then, rcond=None)[0]
+    left = np.abs(unit @ rotation - then).max(axis=0) / np.linalg.norm(then, axis=0)
     if (left > _ALIKE).any():
-        names = [linear.coordinates[k] for k in others[left > _ALIKE]]
-        raise _no_frame(f"what {abbreviate_names(names)} displaces changes its shape as it turns")
-    return np.asarray(found / size[:, None])
+        names = [linear.coordinate_names[k] for k in perturbations[left > _ALIKE]]
+        raise _no_frame(
+            f"the displacements by {abbreviate_names(names)} change their shape during rotation"
+        )
+    return np.asarray(rotation / size[:, None])
 
 
-def _refuse_asymmetric(linear: LinearEquations) -> None:
+def _check_constant_matrices(linear: LinearEquations) -> None:
     """Raise SceneError where the matrices of y change along the motion."""
     there = later(linear)
     scale = 1 / np.sqrt(np.abs(np.diag(linear.M)))
-    mass, stiff = (_largest(one, scale) for one in (linear.M, linear.K))
-    assert linear.carrying is not None
-    fastest = max(np.sqrt(stiff / mass), float(np.abs(linear.carrying.rates).max()))
+    mass, stiff = (_largest(matrix, scale) for matrix in (linear.M, linear.K))
+    assert linear.frame_transform is not None
+    fastest = max(np.sqrt(stiff / mass), float(np.abs(linear.frame_transform.rates).max()))
     for name, floor in (("M", mass), ("C", mass * fastest), ("K", mass * fastest**2)):
-        one, other = (getattr(x, name) * np.outer(scale, scale) for x in (linear, there))
-        rows = np.maximum(np.abs(one).max(axis=0), np.abs(one).max(axis=1))
+        now, then = (getattr(x, name) * np.outer(scale, scale) for x in (linear, there))
+        rows = np.maximum(np.abs(now).max(axis=0), np.abs(now).max(axis=1))
         allowed = SAME * np.sqrt(np.outer(rows, rows)) + _ROUNDING * max(rows.max(), floor)
-        wrong = np.abs(one - other) > allowed
+        wrong = np.abs(now - then) > allowed
         if wrong.any():
-            names = [linear.coordinates[k] for k in np.flatnonzero(wrong.any(axis=0))]
-            raise _no_frame(f"{_NAMES[name]} of {abbreviate_names(names)} changes as it turns")
+            names = [linear.coordinate_names[k] for k in np.flatnonzero(wrong.any(axis=0))]
+            raise _no_frame(f"{_NAMES[name]} of {abbreviate_names(names)} changes during rotation")
 
 
 _NAMES = {"M": "the inertia", "C": "the damping or gyroscopic load", "K": "the stiffness"}
@@ -116,5 +120,5 @@ def _largest(matrix: Array, scale: Array) -> float:
 
 def _no_frame(why: str) -> SceneError:
     return SceneError(
-        f"fixed frame: the rotor is not axisymmetric, and no three or more blades are equal: {why}"
+        f"fixed frame: the rotor is not axisymmetric and has no three or more equal blades: {why}"
     )

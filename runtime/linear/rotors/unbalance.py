@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from mstmm.argument_validation import abbreviate
 from mstmm.array_validation import Array, finite_float
 from mstmm.errors import SceneError
-from mstmm.risk import AssessedAnswer, DeferredRisks, Risk
+from mstmm.risk import AssessedResult, DeferredRisks, Risk
 
 from ...engine.body_references import BodyReferences
-from ...risk_checks.answers import merge_over_values
+from ...risk_checks.state_risks import merge_over_values
 from .. import file_formats
 from .displacements import angular_velocity
 
@@ -28,26 +28,26 @@ Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, eq=False)
-class UnbalanceResponse(AssessedAnswer):
+class UnbalanceResponse(AssessedResult):
     """Whirl of points due to an unbalance m e that rotates with a body, in the fixed frame.
 
     Attributes:
-        parameter, values: the parameter and its values (m,).
+        parameter_name, parameter_values: the parameter and its values (m,).
         spin: (m,) spin speed of the body and frequency of the whirl, rad/s.
         at, unbalance: end with the unbalance, and m e in kg m.
-        points: names of the observed ends.
+        end_names: names of the observed ends.
         displacements: (m, points, 3) complex, m, inertial axes: the motion is the real part of
             displacements * exp(i spin t); the unbalance rotates from the first of `directions`
             towards the second.
         directions: (2, 3) unit vectors normal to the spin axis.
     """
 
-    parameter: str
-    values: Array = field(repr=False)
+    parameter_name: str
+    parameter_values: Array = field(repr=False)
     spin: Array = field(repr=False)
     at: str
     unbalance: float
-    points: tuple[str, ...]
+    end_names: tuple[str, ...]
     displacements: Complex = field(repr=False)
     directions: Array = field(repr=False)
     findings: Iterable[Risk] = field(default=(), repr=False)
@@ -75,9 +75,9 @@ class UnbalanceResponse(AssessedAnswer):
         """
         from ..plots.bode_and_locus import unbalance
 
-        return unbalance(self.spin, self.amplitude, self.points, path)
+        return unbalance(self.spin, self.amplitude, self.end_names, path)
 
-    def to_dataset(self) -> Any:
+    def to_xarray(self) -> Any:
         """`xarray.Dataset` with displacements split into real and imaginary parts.
 
         Raises EnvironmentFailure without the extra.
@@ -89,20 +89,26 @@ class UnbalanceResponse(AssessedAnswer):
             "minor_axis": (along[:2], self.minor_axis, {"units": "m"}),
             "real": (along, self.displacements.real), "imag": (along, self.displacements.imag),
         }  # fmt: skip
-        coords = {"value": self.values, "point": list(self.points), "axis": ["x", "y", "z"]}
-        about = {"parameter": self.parameter, "at": self.at, "unbalance": self.unbalance}
+        coords = {
+            "value": self.parameter_values,
+            "point": list(self.end_names),
+            "axis": ["x", "y", "z"],
+        }
+        about = {"parameter": self.parameter_name, "at": self.at, "unbalance": self.unbalance}
         return file_formats.xarray().Dataset(arrays, coords, about)
 
     def _rows(self) -> Iterator[tuple[str, ...]]:
         """Header, then one row of text for each value of the parameter."""
         kinds = ("amplitude [m]", "minor axis [m]")
         yield (
-            self.parameter,
+            self.parameter_name,
             "spin [rad/s]",
-            *(f"{p} {kind}" for p in self.points for kind in kinds),
+            *(f"{p} {kind}" for p in self.end_names for kind in kinds),
         )
-        both = np.stack([self.amplitude, self.minor_axis], axis=2).reshape(len(self.values), -1)
-        for value, spin, row in zip(self.values, self.spin, both, strict=True):
+        both = np.stack([self.amplitude, self.minor_axis], axis=2).reshape(
+            len(self.parameter_values), -1
+        )
+        for value, spin, row in zip(self.parameter_values, self.spin, both, strict=True):
             yield tuple(repr(float(x)) for x in (value, spin, *row))
 
     def save(self, path: str | Path) -> Path:
@@ -110,7 +116,7 @@ class UnbalanceResponse(AssessedAnswer):
 
         Raises SceneError for another file extension, EnvironmentFailure without the extra.
         """
-        return file_formats.save(path, self.to_dataset, self._rows())
+        return file_formats.save(path, self.to_xarray, self._rows())
 
 
 def unbalance_response(
@@ -124,12 +130,13 @@ def unbalance_response(
     """Unbalance response; see `Model.unbalance_response`."""
     size = finite_float("unbalance", unbalance, "m e in kg m")
     models = [linear_at(value).to_fixed_frame() for value in values.tolist()]
-    places = [_end(models[0], name) for name in (at, *points)]
+    end_names = [_end(models[0], name) for name in (at, *points)]
     axes = [angular_velocity(linear, at) for linear in models]
     spins = np.array([np.linalg.norm(axis) for axis in axes])
-    across = _across(axes[int(spins.argmax())])
+    across = _normal_vectors(axes[int(spins.argmax())])
     responses = [
-        _response(linear, spin, places) for linear, spin in zip(models, spins.tolist(), strict=True)
+        _response(linear, spin, end_names)
+        for linear, spin in zip(models, spins.tolist(), strict=True)
     ]
     whirls = [
         _whirl(response, spin, size * across, len(points))
@@ -141,10 +148,13 @@ def unbalance_response(
         if response is not None
     ]
     findings = DeferredRisks(
-        lambda: merge_over_values(parameter, [(value, one.risks) for value, one in assessed])
+        lambda: merge_over_values(
+            parameter, [(value, response.risks) for value, response in assessed]
+        )
     )
     return UnbalanceResponse(
-        parameter, values, spins, places[0], size, tuple(places[1:]), np.array(whirls), across,
+        parameter, values, spins, end_names[0], size, tuple(end_names[1:]), np.array(whirls),
+        across,
         findings,
     )  # fmt: skip
 
@@ -156,7 +166,7 @@ def _end(linear: Linear, name: str) -> str:
     return ends.canonical(name) or name
 
 
-def _across(axis: Array) -> Array:
+def _normal_vectors(axis: Array) -> Array:
     """Unit vectors (2, 3) normal to an axis; with it they form a right-handed triad."""
     size = float(np.linalg.norm(axis))
     if not size:
@@ -168,12 +178,12 @@ def _across(axis: Array) -> Array:
     return np.array([first, np.cross(along, first)])
 
 
-def _response(linear: Linear, spin: float, places: Sequence[str]) -> FrequencyResponse | None:
+def _response(linear: Linear, spin: float, end_names: Sequence[str]) -> FrequencyResponse | None:
     """Response of the points to forces at the first place, at the spin; None without spin."""
     if not spin:
         return None
-    inputs = [f"{places[0]}.force.{axis}" for axis in "xyz"]
-    outputs = [f"{point}.position.{axis}" for point in places[1:] for axis in "xyz"]
+    inputs = [f"{end_names[0]}.force.{axis}" for axis in "xyz"]
+    outputs = [f"{point}.position.{axis}" for point in end_names[1:] for axis in "xyz"]
     return linear.frequency_response([spin], inputs, outputs)
 
 
@@ -184,4 +194,4 @@ def _whirl(
     if response is None:
         return np.zeros((count, 3), dtype=np.complex128)
     force = spin**2 * (unbalance[0] - 1j * unbalance[1])
-    return np.asarray((response.values[0] @ force).reshape(count, 3))
+    return np.asarray((response.response[0] @ force).reshape(count, 3))

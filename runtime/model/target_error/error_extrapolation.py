@@ -134,33 +134,34 @@ class ToleranceRun:
         rtol: its relative tolerance.
         kind: kind of its method; of several methods explicit if all are.
         method: name of its method.
-        apart: distance to the tightest run; 0 for that one, inf for other end times.
-        summed: sum of its local errors; None if the method computes none.
-        held: whether stability, not accuracy, limited many of its steps.
+        distance: distance to the tightest run; 0 for that one, inf for other end times.
+        local_error_sum: sum of its local errors; None if the method computes none.
+        is_stability_limited: whether stability, not accuracy, limited many of its steps.
         growth: error relative to the sum of local errors, where it is better known than typically.
         radians: radians of vibration above the target error that implicit steps have to resolve.
         calm: whether vibration that explicit steps do not resolve is below the target error.
-        parted: share of the run after which it had diverged from the tightest one; 1 if never.
+        divergence_fraction: share of the run after which it had diverged from the tightest one; 1
+            if never.
     """
 
     rtol: float
     kind: Kind
-    apart: float
-    summed: float | None
-    held: bool = False
+    distance: float
+    local_error_sum: float | None
+    is_stability_limited: bool = False
     radians: float = 0.0
     calm: bool = False
     growth: float | None = None
-    parted: float = 1.0
+    divergence_fraction: float = 1.0
     method: str = ""
 
-    def seen(self, distances: Array) -> ToleranceRun:
+    def compared_with(self, distances: Array) -> ToleranceRun:
         """Run with its distances (n,) to the tightest one; empty for another end time."""
         if not len(distances):
-            return replace(self, apart=math.inf)
+            return replace(self, distance=math.inf)
         diverged = np.flatnonzero(~(distances < _PARAMETERS[self.kind].divergence))
         parted = float(diverged[0]) / max(len(distances) - 1, 1) if len(diverged) else 1.0
-        return replace(self, apart=float(distances.max()), parted=parted)
+        return replace(self, distance=float(distances.max()), divergence_fraction=parted)
 
 
 def first_rtol(target: float, kind: Kind, radians: float = 0.0) -> float:
@@ -186,11 +187,14 @@ def estimate_error(runs: Sequence[ToleranceRun]) -> float | None:
     before, last = runs[-2:]
     reduction = (last.rtol / before.rtol) ** _error_power(runs) if last.rtol < before.rtol else 1.0
     parameters = _PARAMETERS[last.kind]
-    error = parameters.safety * before.apart * (_TWO_RUN_FACTOR if len(runs) == 2 else 1.0)
-    if before.apart < parameters.divergence:
+    error = parameters.safety * before.distance * (_TWO_RUN_FACTOR if len(runs) == 2 else 1.0)
+    if before.distance < parameters.divergence:
         is_constant = last.calm and before.calm and last.rtol >= 0.99 * _MIN_CALM_STEP * before.rtol
         return error * (1.0 if is_constant else reduction)
-    if before.kind is last.kind is Kind.EXPLICIT and _LATE_DIVERGENCE <= before.parted < 1.0:
+    if (
+        before.kind is last.kind is Kind.EXPLICIT
+        and _LATE_DIVERGENCE <= before.divergence_fraction < 1.0
+    ):
         return min(error, _GROWTH_SAFETY * last.rtol * _error_growth(before))
     return error
 
@@ -206,9 +210,9 @@ def next_rtol(runs: Sequence[ToleranceRun], target: float, kind: Kind) -> float:
     if error is None or (runs[-2].kind, runs[-2].method) != (kind, last.method):
         factor, tightest = _factor_by_local_errors(last, target), min(_ROUNDING, last.rtol / 2)
         max_factor = _MAX_FIRST_STEP
-    elif not runs[-2].apart < _PARAMETERS[kind].divergence:
+    elif not runs[-2].distance < _PARAMETERS[kind].divergence:
         factor = _MAX_DIVERGED_STEP
-        if kind is Kind.EXPLICIT and runs[-2].parted < 1.0:
+        if kind is Kind.EXPLICIT and runs[-2].divergence_fraction < 1.0:
             factor = min(
                 max(_rtol_without_divergence(runs[-2], target) / last.rtol, _MIN_DIVERGED_STEP),
                 _MAX_DIVERGED_STEP,
@@ -244,7 +248,7 @@ def _rtol_without_divergence(before: ToleranceRun, target: float) -> float:
 def _error_growth(run: ToleranceRun) -> float:
     """Growth of errors over the whole time, at the rate until a run had diverged."""
     ratio = max(_PARAMETERS[run.kind].divergence / run.rtol, 1.0)
-    return float(ratio ** (1.0 / max(run.parted, 0.1)))
+    return float(ratio ** (1.0 / max(run.divergence_fraction, 0.1)))
 
 
 def _rtol_of_other_kind(
@@ -267,7 +271,7 @@ def _rtol_of_other_kind(
 def no_gain_reason(runs: Sequence[ToleranceRun]) -> str:
     """Reason that no tolerance helps, or ""."""
     is_constant = len(runs) > 3 and not _error_decreases(runs) and not _error_decreases(runs[:-1])
-    is_constant = is_constant and runs[-2].apart < _PARAMETERS[runs[-1].kind].divergence
+    is_constant = is_constant and runs[-2].distance < _PARAMETERS[runs[-1].kind].divergence
     if is_constant and runs[-1].rtol < _SLOW_DECAY_RTOL:
         return (
             "the error no longer decreases with the tolerance (rounding, or jumps of forces within "
@@ -281,8 +285,8 @@ def no_gain_reason(runs: Sequence[ToleranceRun]) -> str:
 def _error_by_local_errors(run: ToleranceRun) -> float:
     """Estimated error of a run from its local errors."""
     parameters = _PARAMETERS[run.kind]
-    local_sum = run.summed or _SUM_PER_RTOL * run.rtol
-    growth = parameters.limited_growth if run.held else parameters.growth
+    local_sum = run.local_error_sum or _SUM_PER_RTOL * run.rtol
+    growth = parameters.limited_growth if run.is_stability_limited else parameters.growth
     return local_sum * (run.growth or growth + _GROWTH_PER_RADIAN * run.radians)
 
 
@@ -311,9 +315,9 @@ def _observed_power(runs: Sequence[ToleranceRun]) -> float | None:
     a, b, last = runs[-3:]
     if not a.kind is b.kind is last.kind or not a.method == b.method == last.method:
         return None
-    if not 0 < b.apart < math.inf or not 0 < a.apart < math.inf:
+    if not 0 < b.distance < math.inf or not 0 < a.distance < math.inf:
         return None
     divergence = _PARAMETERS[last.kind].divergence
-    if a.apart > divergence:
-        return None if b.apart < divergence else 0.0
-    return math.log(a.apart / b.apart) / math.log(a.rtol / b.rtol)
+    if a.distance > divergence:
+        return None if b.distance < divergence else 0.0
+    return math.log(a.distance / b.distance) / math.log(a.rtol / b.rtol)

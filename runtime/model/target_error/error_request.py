@@ -19,10 +19,16 @@ MIN_ERROR = 1e-12
 
 @dataclass(frozen=True)
 class ErrorRequest:
-    """Target error, of named quantities or, with none, of all coordinates."""
+    """Target error of a run.
+
+    Attributes:
+        error: rad, and relative to the largest excursion for other coordinates; for one quantity in
+            `of` in its unit, for several relative to the excursion of each.
+        of: names of quantities; empty for all coordinates.
+    """
 
     error: float
-    of: tuple[str, ...] = ()
+    of: str | Sequence[str] = ()
 
 
 @dataclass(frozen=True)
@@ -34,7 +40,7 @@ class Control:
     rtol: float | None
     atol: float | None
 
-    def filled(self) -> tuple[str, float, float]:
+    def with_defaults(self) -> tuple[str, float, float]:
         """Method, relative and absolute tolerance, with defaults where not given."""
         default_method = AUTO if self.step is None else METHOD
         return (
@@ -45,27 +51,25 @@ class Control:
 
 
 def parse_error_request(
-    error: float | None, of: str | Sequence[str], given: Control, kept: bool
+    error: float | ErrorRequest | None, given: Control, kept: bool
 ) -> ErrorRequest | None:
-    """Checked request for a target error; None without one.
+    """Checked request for a target error, with a tuple of names; None without one.
 
     `kept` means with a checkpoint, or resumed.  Raises SceneError for an error that cannot be
     reached, and together with settings of the steps.
     """
-    names = require_texts("error_of", of, "rod1.angle")
     if error is None:
-        if names:
-            raise SceneError(
-                f"error_of = {names[0]!r}: expected a target error for it; give error too"
-            )
         return None
-    value = finite_float("error", error, "an error above zero, such as 1e-6")
+    request = error if isinstance(error, ErrorRequest) else ErrorRequest(error)
+    names = require_texts("of", request.of, "rod1.angle")
+    value = finite_float("error", request.error, "an error above zero, such as 1e-6")
     if not value > 0:
         raise SceneError(f"error = {value:g}: expected an error above zero, such as 1e-6")
     if value >= 1 and len(names) != 1:
         raise SceneError(
             f"error = {value:g}: expected less than 1, in rad, and relative to the excursion of "
-            "other coordinates; name one quantity (error_of) for an error in its unit"
+            "other coordinates; name one quantity, "
+            "ErrorRequest(error, of=...), for an error in its unit"
         )
     if value < MIN_ERROR:
         raise SceneError(

@@ -47,55 +47,61 @@ class Vibration:
         rate: |lambda| of the fastest motion, 1/s.
         span: time of the run, s.
         rates, dampings: |lambda| and damping ratio of every motion, (k,).
-        parts, speeds: amplitudes (k,) of coordinates and of speeds relative to the size of their
-            unit (1 for rad and rad/s).  Empty if only the rate is known.
+        position_amplitudes, speed_amplitudes: amplitudes (k,) of coordinates and of speeds relative
+            to the size of their unit (1 for rad and rad/s).  Empty if only the rate is known.
     """
 
     rate: float
     span: float
     rates: Array
     dampings: Array
-    parts: Array
-    speeds: Array
+    position_amplitudes: Array
+    speed_amplitudes: Array
 
     @property
-    def known(self) -> bool:
+    def has_motions(self) -> bool:
         """Whether more than the rate is known."""
         return bool(len(self.rates))
 
     @property
     def fastest_damping(self) -> float:
         """Smallest damping ratio of the fastest motions."""
-        return float(self._of_fastest(self.dampings).min(initial=1.0))
+        return float(self._fastest_values(self.dampings).min(initial=1.0))
 
     def races(self, target: float) -> bool:
         """Whether the amplitude of a fastest motion is far above the target error."""
-        return bool((self._of_fastest(self.parts) > _FAR_ABOVE * target).any())
+        return bool((self._fastest_values(self.position_amplitudes) > _FAR_ABOVE * target).any())
 
-    def _of_fastest(self, numbers: Array) -> Array:
+    def _fastest_values(self, numbers: Array) -> Array:
         return numbers[self.rates >= _FAST_SHARE * self.rate]
 
     def radians(self, target: float) -> float:
         """Largest number of radians until the amplitude of a motion is below `target`."""
-        return self._radians_above(self.parts, target)
+        return self._radians_above(self.position_amplitudes, target)
 
-    def demanding(self, target: float) -> float:
+    def demanding_radians(self, target: float) -> float:
         """`radians`, weighted less for motions not far above `target`, whose phase may err more."""
         return self._radians_above(
-            self.parts, target, np.minimum(self.parts / (_FAR_ABOVE * target), 1.0) ** _WEIGHT_POWER
+            self.position_amplitudes,
+            target,
+            np.minimum(self.position_amplitudes / (_FAR_ABOVE * target), 1.0) ** _WEIGHT_POWER,
         )
 
-    def speeding(self, target: float) -> float:
+    def radians_above_speed(self, target: float) -> float:
         """`radians` until the speed of a motion is below `target`."""
-        return self._radians_above(self.speeds, target)
+        return self._radians_above(self.speed_amplitudes, target)
 
     def outruns(self, steps: int) -> bool:
         """Whether so many steps over the run do not resolve the fastest motion."""
         return self.rate * self.span > _UNRESOLVED_STEP * steps
 
-    def left_behind(self, steps: int) -> float:
+    def unresolved_amplitude(self, steps: int) -> float:
         """Largest amplitude of motions that so many steps do not resolve; 0 for none."""
-        return float(self.parts[self.rates * self.span > _UNRESOLVED_STEP * steps].max(initial=0.0))
+        return float(
+            self.position_amplitudes[self.rates * self.span > _UNRESOLVED_STEP * steps].max(
+                initial=0.0
+            )
+        )
 
     def _radians_above(
         self, amplitudes: Array, target: float, weights: Array | float = 1.0
@@ -135,13 +141,10 @@ def initial_vibration(
     except np.linalg.LinAlgError:
         raise NumericalFailure(f"the motions at t = {t:.9g} s are not finite") from None
     fast = np.abs(roots) * span > _SLOW_RADIANS
-    fast_rates, amplitudes = (
-        np.abs(roots[fast]),
-        np.abs(vectors[:, fast] * participations[fast]),
-    )
+    fast_rates, amplitudes = (np.abs(roots[fast]), np.abs(vectors[:, fast] * participations[fast]))
     amplitudes /= fast_rates
-    q_parts = _relative_amplitudes(amplitudes[: len(q)], model.layout.q_by_unit)
-    u_parts = _relative_amplitudes(amplitudes[len(q) :], model.layout.u_by_unit)
+    q_parts = _relative_amplitudes(amplitudes[: len(q)], model.coordinate_layout.q_by_unit)
+    u_parts = _relative_amplitudes(amplitudes[len(q) :], model.coordinate_layout.u_by_unit)
     dampings = np.maximum(-roots[fast].real, 0.0) / fast_rates
     return Vibration(rate, span, fast_rates, dampings, q_parts, u_parts)
 

@@ -134,7 +134,9 @@ def damps_own_errors(run: Trajectory) -> bool:
 def _fastest_possible(model: CompiledScene) -> float:
     """Upper bound of |lambda| (1/s) of all motions of a scene; cached."""
     if model not in _fastest_rates:
-        squares = [squared_frequencies(body).max(initial=0.0) for body in model.flexible.values()]
+        squares = [
+            squared_frequencies(body).max(initial=0.0) for body in model.flexible_bodies.values()
+        ]
         shape_rate = _FREE_SHAPE_FACTOR * math.sqrt(max(squares, default=0.0))
         _fastest_rates[model] = max(shape_rate, fastest_possible(model.scene))
     return _fastest_rates[model]
@@ -173,7 +175,7 @@ class Family:
             pass
 
     @property
-    def begins(self) -> Kind:
+    def first_kind(self) -> Kind:
         """Kind of method of the first run."""
         if not self._is_free or self._is_rescued:
             return method_kind(self._settings.method)
@@ -192,19 +194,21 @@ class Family:
     def radians(self) -> float:
         """Radians of vibration well above the target error that need short steps; 0 if unknown."""
         vibration = self._known_vibration
-        return 0.0 if vibration is None else vibration.demanding(_WELL_ABOVE * self._error)
+        return 0.0 if vibration is None else vibration.demanding_radians(_WELL_ABOVE * self._error)
 
     def calm(self, run: Trajectory) -> bool:
         """Whether the motions that the steps of a run do not resolve are below the target error."""
         vibration, statistics = self._known_vibration, run.statistics
         if vibration is None or statistics is None:
             return False
-        return 0.0 < vibration.left_behind(statistics.steps) < self._error
+        return 0.0 < vibration.unresolved_amplitude(statistics.steps) < self._error
 
     @property
     def _known_vibration(self) -> Vibration | None:
         """Motions at the start, if more than their rate is known."""
-        return self._vibration if self._vibration is not None and self._vibration.known else None
+        return (
+            self._vibration if self._vibration is not None and self._vibration.has_motions else None
+        )
 
     @cached_property
     def _prefers_damping(self) -> bool:
@@ -234,7 +238,7 @@ class Family:
     def _threshold(self, at_loose: float, power: float) -> float:
         return at_loose * (_LOOSE / self._error) ** power
 
-    def next(self, rtol: float, asked: float, made: Sequence[Trajectory]) -> Kind:
+    def next_kind(self, rtol: float, asked: float, made: Sequence[Trajectory]) -> Kind:
         """Kind of method of the next run after those `made`.
 
         `rtol` is its tolerance if the kind stays the same; `asked` is the target error relative to
@@ -251,9 +255,9 @@ class Family:
 
     def _explicit_steps(self, rtol: float, made: Sequence[Trajectory]) -> float:
         """Estimated number of explicit steps of a run."""
-        rate = max([0.0, *(use.rate or 0.0 for run in made for use in run.methods)])
+        rate = max([0.0, *(use.fastest_rate or 0.0 for run in made for use in run.methods)])
         radians = max(self._fastest_radians, rate * self._span)
-        resolved = radians if self._vibration is None else self._vibration.speeding(rtol)
+        resolved = radians if self._vibration is None else self._vibration.radians_above_speed(rtol)
         return max(
             radians / _STABLE_STEP,
             resolved / _RESOLVED_STEP * (_RESOLVED_RTOL / rtol) ** (1 / _RESOLVED_ORDER),
@@ -281,7 +285,7 @@ class Family:
         """Whether all runs use the method of the user, or `auto` once it has made a run."""
         return not self._is_free or self._is_rescued or bool(made and made[-1].methods)
 
-    def most_steps(self, method: str) -> int:
+    def max_first_steps(self, method: str) -> int:
         """Number of steps after which a first run by this method is stopped; 0 for no limit."""
         max_steps, kind = self._settings.max_steps, method_kind(method)
         if not self._is_free or method == AUTO or kind is Kind.IMPLICIT:

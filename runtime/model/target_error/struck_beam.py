@@ -30,7 +30,7 @@ def starts_vibrating(model: CompiledScene, t: float, q: Array, u: Array) -> bool
     """
     engine = model.looped
     shapes = np.zeros(engine.nu, bool)
-    for body in model.layout.modal.values():
+    for body in model.coordinate_layout.modal.values():
         shapes[body.u_slice] = True
     if not shapes.any() or engine.nu > _MAX_SPEEDS or np.count_nonzero(~shapes) > _MAX_RIGID_SPEEDS:
         return False

@@ -128,7 +128,9 @@ class ToleranceSearch:
     def _make_run(self, method: str, rtol: float) -> Trajectory | None:
         """Make one run; return it if it did not reach its end."""
         rtol, atol = _round_tolerance(rtol), _round_tolerance(_ATOL_PER_RTOL * rtol)
-        max_steps = self._settings.max_steps if self._completed else self._family.most_steps(method)
+        max_steps = (
+            self._settings.max_steps if self._completed else self._family.max_first_steps(method)
+        )
         settings = replace(
             self._settings, rtol=rtol, atol=atol, method=method, max_steps=max_steps,
             first_step=self._first_step(),
@@ -159,7 +161,7 @@ class ToleranceSearch:
         """Compared values of a run; for coordinates without creating a result."""
         if not self._request.of:
             return run.q
-        result = result_of(self._model, self._findings.given(run, self._q, self._u))
+        result = result_of(self._model, self._findings.attach_to(run, self._q, self._u))
         if self._measure is None:
             self._measure = Quantities(result, self._request.of)
         return self._measure.read(result)
@@ -169,9 +171,9 @@ class ToleranceSearch:
         last = self._completed[-1]
         if self._tolerance_runs:
             distances = self._distances(self._completed[-2], last)
-            self._tolerance_runs[-1] = self._tolerance_runs[-1].seen(distances)
+            self._tolerance_runs[-1] = self._tolerance_runs[-1].compared_with(distances)
         statistics = last.run.statistics
-        summed = None if statistics is None else statistics.sum_local_error
+        summed = None if statistics is None else statistics.sum_of_local_errors
         rtol, is_limited = last.run.settings.rtol, is_stability_limited(last.run)
         radians = self._family.radians if last.kind is Kind.IMPLICIT else 0.0
         calm = last.kind is Kind.EXPLICIT and self._family.calm(last.run)
@@ -191,11 +193,11 @@ class ToleranceSearch:
         """
         if last.kind is not Kind.EXPLICIT:
             return None
-        if self._model.flexible and isinstance(self._measure, Coordinates):
-            self._measure.scale_by(last.numbers)
-            growth = min(_GROWTH_LENGTH / self._measure.least, _MAX_SHAPE_GROWTH)
+        if self._model.flexible_bodies and isinstance(self._measure, Coordinates):
+            self._measure.set_scales(last.numbers)
+            growth = min(_GROWTH_LENGTH / self._measure.min_scale, _MAX_SHAPE_GROWTH)
             return growth * (_DAMPED_SHARE if damps_own_errors(last.run) else 1.0)
-        is_unresolved = self._family.leaves(last.run) and not self._model.flexible
+        is_unresolved = self._family.leaves(last.run) and not self._model.flexible_bodies
         return _GROWTH_OF_SPEEDS if is_unresolved else None
 
     def _distances(self, run: _CompletedRun, tightest: _CompletedRun) -> Array:
@@ -207,8 +209,8 @@ class ToleranceSearch:
         n = min(len(run.numbers), len(tightest.numbers))
         if not n or abs(len(run.numbers) - len(tightest.numbers)) > 1:
             return np.zeros(0)
-        self._measure.scale_by(tightest.numbers)
-        return self._measure.apart(run.numbers[:n], tightest.numbers[:n]) / self._motion_size
+        self._measure.set_scales(tightest.numbers)
+        return self._measure.distance(run.numbers[:n], tightest.numbers[:n]) / self._motion_size
 
     def _run_progress(self) -> Progress | None:
         """Progress callback of the next run; each run takes half of the remaining progress."""
@@ -232,7 +234,7 @@ class ToleranceSearch:
             return 1.0
         numbers = self._completed[-1].numbers
         start = np.broadcast_to(numbers[:1], numbers.shape)
-        return float(self._measure.apart(numbers, start).max(initial=0.0)) or 1.0
+        return float(self._measure.distance(numbers, start).max(initial=0.0)) or 1.0
 
     def _estimated_error(self) -> float | None:
         """Estimated error of the last run, in the unit of the target; None if unknown."""
@@ -253,7 +255,7 @@ class ToleranceSearch:
 
     def _first_setting(self) -> tuple[str, float]:
         """Method and tolerance of the first run."""
-        kind = self._family.begins
+        kind = self._family.first_kind
         rtol = first_rtol(self._request.error, kind, self._family.radians)
         return self._family.method(kind, rtol, ()), rtol
 
@@ -262,7 +264,7 @@ class ToleranceSearch:
         target, before = self._request.error / self._motion_size, self._tolerance_runs[-1].kind
         rtol = next_rtol(self._tolerance_runs, target, before)
         made = [completed.run for completed in self._completed]
-        kind = self._family.next(rtol, target, made)
+        kind = self._family.next_kind(rtol, target, made)
         if kind is not before:
             rtol = next_rtol(self._tolerance_runs, target, kind)
         return self._family.method(kind, rtol, made), rtol
@@ -273,7 +275,7 @@ class ToleranceSearch:
         """Result of an interrupted run, or of a failed first one."""
         reason = f"a run did not reach its end: {run.message}"
         achieved = self._achieved_error(run, None, reason, "no run reached its end")
-        return result_of(self._model, self._as_requested(replace(run, reached=achieved)))
+        return result_of(self._model, self._as_requested(replace(run, achieved_error=achieved)))
 
     def _best_result(self, reason: str) -> Result:
         """Result of the tightest run; `reason` why the target is not reached, or ""."""
@@ -281,16 +283,17 @@ class ToleranceSearch:
         if reason and len(self._completed) > 1:
             before = self._completed[-2].run
             reference = f"rtol {before.settings.rtol:.0e}"
-            error = compare(self._model.layout, best.run, before, reference, self._q)
-            if error.horizon is not None:
+            error = compare(self._model.coordinate_layout, best.run, before, reference, self._q)
+            if error.divergence_time is not None:
                 reason = (
                     "small errors grow until the motion is unpredictable, at these "
-                    f"tolerances from t = {error.horizon:.4g} s on (end earlier), and {reason}"
+                    f"tolerances from t = {error.divergence_time:.4g} s on (end earlier), and "
+                    f"{reason}"
                 )
         reached = self._achieved_error(
             best.run, self._estimated_error(), reason, self._estimate_description()
         )
-        run = replace(best.run, reached=reached, notes=(*best.run.notes, *self._notes))
+        run = replace(best.run, achieved_error=reached, notes=(*best.run.notes, *self._notes))
         return result_of(self._model, self._as_requested(run), error)
 
     def _estimate_description(self) -> str:
@@ -306,8 +309,8 @@ class ToleranceSearch:
         runs = [
             _attempt(
                 completed.run, completed.cpu_s,
-                None if completed is self._completed[-1] or compared.apart == math.inf
-                else compared.apart * self._motion_size,
+                None if completed is self._completed[-1] or compared.distance == math.inf
+                else compared.distance * self._motion_size,
             )
             for completed, compared in zip(self._completed, self._tolerance_runs, strict=True)
         ]  # fmt: skip
@@ -322,7 +325,7 @@ class ToleranceSearch:
 
     def _as_requested(self, run: Trajectory) -> Trajectory:
         """Run with the findings before it, at the output times of the user."""
-        run = self._findings.given(run, self._q, self._u)
+        run = self._findings.attach_to(run, self._q, self._u)
         times, max_steps = self._times or self._settings.output_times, self._settings.max_steps
         if (times, max_steps) == (run.settings.output_times, run.settings.max_steps):
             return run

@@ -11,7 +11,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 from mstmm.errors import SceneError
-from mstmm.expression.expression import Expression, parse
 from mstmm.numerics.rotations import to_matrix, to_quaternion
 from mstmm.scene import Body, Hinge, Scene, split_reference
 from mstmm.scene.tables.body import End
@@ -20,7 +19,7 @@ from mstmm.scene.tables.loads import Load
 from ...flexible.modal_body import ModalBody
 from ...flexible.modal_port import MassPoint, ModalPort
 from ..loops.cut_tree import Cut
-from .rigid_substitution import RigidSubstitution
+from .rigid_substitution import RigidSubstitution, scale_expression
 
 HELD, POINT = "held", "point"
 
@@ -40,23 +39,23 @@ class ExpandedScene:
 
     Attributes:
         scene: of nodes.
-        described: as the user wrote it.
+        user_scene: as the user wrote it.
         bodies: flexible bodies.
         nodes: end ("blade.tip") -> name of its node.
         passages: node -> section that its connection passes.
         idle: nodes without hinges, loads and force elements on them.
-        held: flexible body -> its end on the inboard hinge.
+        inboard_ends: flexible body -> its end on the inboard hinge.
         rigidified: substitution of bodies that are rigid in the run; None without any.
         cuts: cut hinges and constraints that close loops.
     """
 
     scene: Scene
-    described: Scene
+    user_scene: Scene
     bodies: Mapping[str, ModalBody]
     nodes: dict[str, str] = field(default_factory=dict)
     passages: dict[str, Passage] = field(default_factory=dict)
     idle: set[str] = field(default_factory=set)
-    held: dict[str, str] = field(default_factory=dict)
+    inboard_ends: dict[str, str] = field(default_factory=dict)
     rigidified: RigidSubstitution | None = None
     cuts: tuple[Cut, ...] = ()
 
@@ -90,7 +89,7 @@ class _Expansion:
         self.used = {self._full_reference(reference) for reference in self._references()}
 
     def run(self) -> ExpandedScene:
-        self.expanded.held = self._inboard_ends()
+        self.expanded.inboard_ends = self._inboard_ends()
         hinges = list(self.scene.hinge)
         for name, body in self.expanded.bodies.items():
             hinges = self._add_flexible_body(name, body, hinges)
@@ -149,7 +148,7 @@ class _Expansion:
             axes = on if load.axes == "body" else load.axes
             return load.model_copy(update={"on": on, "axes": axes})
         length = self._span_length(load)
-        force = tuple(_scaled(entry, length) for entry in load.force_per_length)
+        force = tuple(scale_expression(entry, length) for entry in load.force_per_length)
         axes = name if load.axes == "body" else load.axes
         return load.model_copy(update={"on": f"{name}.{load.name}", "force": force, "axes": axes})
 
@@ -163,13 +162,13 @@ class _Expansion:
 
     def _add_flexible_body(self, name: str, body: ModalBody, hinges: list[Hinge]) -> list[Hinge]:
         """Add the nodes of a flexible body; returns `hinges` with its inboard hinge on them."""
-        inboard_end = self.expanded.held.get(name)
+        inboard_end = self.expanded.inboard_ends.get(name)
         if inboard_end is None:
             raise SceneError(
                 f'scene: "{name}" has no inboard hinge; add one with outboard = "{name}"'
             )
         port = body.ports[inboard_end]
-        moves = port.moves
+        moves = port.can_move
         frame = Body(name="frame", mass=0.0)
         if moves:
             node = f"{name}/{HELD}"
@@ -223,12 +222,6 @@ class _Expansion:
         weld = Hinge(name="weld", type="fixed", inboard="ground", outboard="frame")
         update = {"name": name, "inboard": inboard, "outboard": outboard}
         self.internal.append(weld.model_copy(update=update))
-
-
-def _scaled(entry: Expression, factor: float) -> Expression:
-    if entry.is_zero:
-        return entry
-    return parse(f"{factor!r} * ({entry.text})", constants=dict(entry.constants))
 
 
 __all__ = ["ExpandedScene", "Passage", "expand"]

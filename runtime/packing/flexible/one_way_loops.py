@@ -35,7 +35,7 @@ def loop_elements(scene: Scene, plan: ClosurePlan) -> tuple[Hinge | Constraint, 
         *(mechanism.groups[cut] for cut in plan.cut_of),
         *plan.groups[first : first + len(scene.constraint)],
     ]
-    crossed = {plan.tree[body] for group in row_groups for body, _ in paths.crossed(group)}
+    crossed = {plan.tree[body] for group in row_groups for body, _ in paths.crossed_bodies(group)}
     hinges = scene.skeleton.hinges
     return (*(hinges[number] for number in sorted(crossed.union(plan.cut_of))), *scene.constraint)
 

@@ -48,18 +48,18 @@ class RigidSubstitution:
         scene: after the substitution.
         nodes: end ("blade.tip") -> body welded there ("blade/tip").
         one_way: one-way coupled body -> its modal body.
-        held: one-way coupled body -> its end on the inboard hinge.
-        holders: one-way coupled body -> its inboard hinge.
-        looped: names of the hinges in closed loops.
+        inboard_ends: one-way coupled body -> its end on the inboard hinge.
+        inboard_hinges: one-way coupled body -> its inboard hinge.
+        loop_hinges: names of the hinges in closed loops.
         passed: one-way coupled bodies in a closed loop.
     """
 
     scene: Scene
     nodes: dict[str, str] = field(default_factory=dict)
     one_way: dict[str, ModalBody] = field(default_factory=dict)
-    held: dict[str, str] = field(default_factory=dict)
-    holders: dict[str, Hinge] = field(default_factory=dict)
-    looped: frozenset[str] = frozenset()
+    inboard_ends: dict[str, str] = field(default_factory=dict)
+    inboard_hinges: dict[str, Hinge] = field(default_factory=dict)
+    loop_hinges: frozenset[str] = frozenset()
     passed: frozenset[str] = frozenset()
 
 
@@ -123,12 +123,12 @@ class _Substitution:
             "beam": tuple(beam for beam in scene.beam if beam.name not in names),
             "elastic": tuple(body for body in scene.elastic if body.name not in names),
             "body": (*scene.body, *self.bodies.values()),
-            "hinge": (*map(self._changed_hinge, scene.hinge), *self.welds),
+            "hinge": (*map(self._substitute_hinge, scene.hinge), *self.welds),
             "chain": tuple(
                 chain.model_copy(update={"inboard": self._node(chain.inboard)})
                 for chain in scene.chain
             ),
-            "load": tuple(map(self._changed_load, scene.load)),
+            "load": tuple(map(self._substitute_load, scene.load)),
             "spring": tuple(map(self._with_node_ends, scene.spring)),
             "bushing": tuple(map(self._with_node_ends, scene.bushing)),
             "constraint": tuple(map(self._with_node_ends, scene.constraint)),
@@ -149,9 +149,9 @@ class _Substitution:
             return
         self.result.one_way[name] = modal
         hinge = self.inboard_hinges.get(name)
-        self.result.held[name] = next(iter(ends)) if hinge is None else hinge.outboard_end
+        self.result.inboard_ends[name] = next(iter(ends)) if hinge is None else hinge.outboard_end
         if hinge is not None:
-            self.result.holders[name] = hinge
+            self.result.inboard_hinges[name] = hinge
         used = dict.fromkeys(split_reference(reference)[1] for reference in self._references(name))
         for end in (*used, *(load.name for load in self._distributed_loads(name))):
             self._add_welded_end(name, end)
@@ -173,7 +173,7 @@ class _Substitution:
         elements, bodies = loop_elements(self.scene, plan), self.result.one_way
         check_loop_ends(bodies, elements)
         self.result.passed = frozenset(name for name in bodies if any(ends_on_body(name, elements)))
-        self.result.looped = frozenset(
+        self.result.loop_hinges = frozenset(
             element.name for element in elements if not isinstance(element, Constraint)
         )
 
@@ -202,7 +202,7 @@ class _Substitution:
     def _node(self, reference: str) -> str:
         return self.result.nodes.get(reference, reference)
 
-    def _changed_hinge(self, hinge: Hinge) -> Hinge:
+    def _substitute_hinge(self, hinge: Hinge) -> Hinge:
         update: dict[str, object] = {"inboard": self._node(hinge.inboard)}
         if self.cut is not None:
             cut = hinge.name in self.cut
@@ -214,7 +214,7 @@ class _Substitution:
         ends = {"from_": self._node(element.from_), "to": self._node(element.to)}
         return element.model_copy(update=ends)
 
-    def _changed_load(self, load: Load) -> Load:
+    def _substitute_load(self, load: Load) -> Load:
         """The load on a rigid body; a distributed one becomes its resultant force."""
         name = split_reference(load.on)[0]
         if name not in self.substituted:
@@ -223,7 +223,7 @@ class _Substitution:
         if load.force_per_length is None:
             return load.model_copy(update=update | {"on": self._node(load.on)})
         first, last = load.span or (0.0, self._length(name))
-        force = tuple(_scaled(entry, last - first) for entry in load.force_per_length)
+        force = tuple(scale_expression(entry, last - first) for entry in load.force_per_length)
         on = self._node(f"{name}.{load.name}")
         return load.model_copy(
             update=update | {"on": on, "force": force, "force_per_length": None, "span": None}
@@ -235,7 +235,8 @@ def _middle(load: Load, length: float) -> float:
     return (first + last) / 2
 
 
-def _scaled(entry: Expression, factor: float) -> Expression:
+def scale_expression(entry: Expression, factor: float) -> Expression:
+    """Copy of an expression, multiplied by a factor."""
     if entry.is_zero:
         return entry
     return parse(f"{factor!r} * ({entry.text})", constants=dict(entry.constants))

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from mstmm.scene import Spring
 
-from ..expression_tapes import Moving, effort_kernel
+from ..expression_tapes import SeedPorts, effort_kernel
 from ..scene_elements import declared_numbers
 from ..scene_frames import Frames
 from ..system import ForceNumbers, Numbers
 
 
-def spring_numbers(frames: Frames, spring: Spring, moving: Moving) -> ForceNumbers:
+def spring_numbers(frames: Frames, spring: Spring, moving: SeedPorts) -> ForceNumbers:
     """Force element between the ends of a spring, with its effort expression if it has one."""
     element = frames.elements.get("force", spring.type, spring.name)
     from_end, to_end = (

@@ -17,7 +17,7 @@ def closure_numbers(frames: Frames, runs: Sequence[BodyRun]) -> Iterator[Closure
     """Closures of the cut hinges, then of the constraints."""
     if not frames.expanded.cuts:
         return
-    first_bodies = {run.place: run.alike[0] for run in runs}
+    first_bodies = {run.position: run.members[0] for run in runs}
     for cut in frames.expanded.cuts:
         place = frames.positions[cut.frame]
         if cut.constraint is None:

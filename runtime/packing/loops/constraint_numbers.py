@@ -34,4 +34,4 @@ def constraint_closure(constraint: Constraint, frames: Frames, place: int) -> Cl
     assert constraint.radius is not None
     axis = rotate((axes[0:3], axes[3:6], axes[6:9]), constraint.unit_axis)  # type: ignore[arg-type]
     p = (height, constraint.radius, *axis)
-    return ClosureNumbers(*ends, (0, 1, 2), "rolling", p, of_speeds=(0, 1), asked=3)
+    return ClosureNumbers(*ends, (0, 1, 2), "rolling", p, speed_directions=(0, 1), asked=3)

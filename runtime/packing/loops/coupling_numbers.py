@@ -41,7 +41,7 @@ def coupling_numbers(
 
     Each coupling has drift, value, rate, rate at rest, and -C hinge by hinge.
     """
-    scene = frames.described
+    scene = frames.user_scene
     if not scene.coupling:
         return (), None
     rows, nodes, couplings = _Rows(frames, scene, runs), list[Node](), []
@@ -122,7 +122,7 @@ class _Rows:
         """Rates of a hinge's coordinates as functions of its coordinates and speeds."""
         graph = self.graph
         speeds = [graph.element("u", slots.u + i) for i in range(slots.nu)]
-        if slots.straight:
+        if slots.rates_are_speeds:
             return speeds
         facts = self.scene.hinges.by_name[slots.name].facts
         if facts is None or facts.rates is None:
@@ -131,9 +131,9 @@ class _Rows:
                 "the rates of its coordinates; generate it again: mstmm generate FILE"
             )
         place = self.frames.hinge_position[slots.name]
-        run = next(run for run in self.runs if run.place <= place < run.place + run.count)
+        run = next(run for run in self.runs if run.position <= place < run.position + run.count)
         inputs = {
-            "p": [graph.constant(float(x)) for x in run.member(place - run.place).hinge_p],
+            "p": [graph.constant(float(x)) for x in run.member(place - run.position).hinge_p],
             "q": [graph.element("q", slots.q + i) for i in range(slots.nq)], "u": speeds,
         }  # fmt: skip
         return Inliner(graph).run(facts.rates, inputs)["qdot"]

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from mstmm.ir.scene_structure import Key
 
-_TITLE, _S, _RATE = "a way along a curve", Param("s"), Param("s_rate", "1/s")
+_TITLE, _S, _RATE = "motion along a curve", Param("s"), Param("s_rate", "1/s")
 _OUTPUTS = (Port("R", (3, 3)), Port("d", (3,)), Port("H", (6,)), Port("v", (3,)), Port("w", (3,)),
             Port("c", (6,)), Port("qdot", (1,)))  # fmt: skip
 

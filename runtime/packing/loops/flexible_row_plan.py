@@ -26,7 +26,7 @@ class FlexibleRowPlan:
 
     def __init__(self, system: System, groups: Sequence[RowGroup]) -> None:
         nodes = _RowTree(system)
-        ends = [tuple(map(nodes.outer, group.ends)) for group in groups]
+        ends = [tuple(map(nodes.outer_node, group.ends)) for group in groups]
         counts = [group.count for group in groups]
         plan = plan_rows(nodes.parents, _row_groups(ends, counts))
         inner = {row.group: row.body for row in plan.rows if nodes.is_inner(row.body)}
@@ -34,11 +34,11 @@ class FlexibleRowPlan:
             for group, node in inner.items():
                 ends[group] = (*ends[group], node - 1)  # the outer node, so that it closes there
             plan = plan_rows(nodes.parents, _row_groups(ends, counts))
-        self.of, self.pairs = plan.of, plan.pairs
+        self.rows_by_group, self.pairs = plan.rows_by_group, plan.pairs
         self.rows = [replace(row, body=nodes.body(row.body)) for row in plan.rows]
-        self.pending, self.bent = dict[int, list[int]](), dict[int, list[int]]()
+        self.pending, self.modal_rows = dict[int, list[int]](), dict[int, list[int]]()
         for node, rows in plan.pending.items():
-            rows_by_body = self.bent if nodes.is_inner(node) else self.pending
+            rows_by_body = self.modal_rows if nodes.is_inner(node) else self.pending
             rows_by_body[nodes.body(node)] = rows
 
 
@@ -56,7 +56,7 @@ class _RowTree:
         for body, parent in enumerate(system.parents.tolist()):
             self.parents[self._first[body]] = GROUND if parent == GROUND else last[parent] - 1
 
-    def outer(self, body: int) -> int:
+    def outer_node(self, body: int) -> int:
         """Node of a rigid body, or outer node of a flexible one."""
         return GROUND if body == GROUND else self._first[body]
 

@@ -39,25 +39,25 @@ def with_loops(
     plan = FlexibleRowPlan(system, row_groups([body.parent for body in bodies], system))
     inertia: dict[int, Entries] = {}
     closures = [
-        _closure(closure, plan.of[group], bodies[closure.frame], sort, inertia)
+        _closure(closure, plan.rows_by_group[group], bodies[closure.frame], sort, inertia)
         for group, closure in enumerate(system.closures)
     ]
-    coupling_rows = (rows[0] for rows in plan.of[len(closures) :])
+    coupling_rows = (rows[0] for rows in plan.rows_by_group[len(closures) :])
     couplings = tuple(
-        _coupling(coupling, -1 if coupling.repeats else next(coupling_rows), bodies, sort)
+        _coupling_structure(coupling, -1 if coupling.repeats else next(coupling_rows), bodies, sort)
         for coupling in system.couplings
     )
     of_speeds = {
         row
         for group, closure in enumerate(system.closures)
-        for row, direction in zip(plan.of[group], closure.directions, strict=True)
-        if direction in closure.of_speeds
+        for row, direction in zip(plan.rows_by_group[group], closure.directions, strict=True)
+        if direction in closure.speed_directions
     }
     of_speeds |= {coupling.row for coupling in couplings if coupling.of_speeds}
     rests: dict[int, int] = {}
     for group, closure in enumerate(system.closures):
         if closure.choice is not None:
-            without_rotors = [row for row in plan.of[group] if row not in inertia]
+            without_rotors = [row for row in plan.rows_by_group[group] if row not in inertia]
             rests |= {row: closure.choice[0] + k for k, row in enumerate(without_rotors)}
     rows = tuple(
         RowStructure(
@@ -70,15 +70,15 @@ def with_loops(
     return _with_pending_rows(bodies, plan), tuple(closures), rows, couplings
 
 
-def _coupling(
+def _coupling_structure(
     coupling: CouplingNumbers, row: int, bodies: Sequence[BodyStructure], sort: EntrySorter
 ) -> CouplingStructure:
     columns, column = list[tuple[int, int]](), coupling.first + len(COUPLING_NUMBERS)
     for hinge in coupling.hinges:
-        columns.append((hinge.place, column))
-        column += bodies[hinge.place].nu
-    kept = sort(() if coupling.kept is None else (coupling.kept,))
-    of_speeds = coupling.of_speeds or coupling.kept is None
+        columns.append((hinge.position, column))
+        column += bodies[hinge.position].nu
+    kept = sort(() if coupling.constant is None else (coupling.constant,))
+    of_speeds = coupling.of_speeds or coupling.constant is None
     return CouplingStructure(row, coupling.first, of_speeds, kept, tuple(columns))
 
 
@@ -86,7 +86,7 @@ def _with_pending_rows(
     bodies: Sequence[BodyStructure], plan: FlexibleRowPlan
 ) -> tuple[BodyStructure, ...]:
     def with_rows(place: int, body: BodyStructure) -> BodyStructure:
-        pending, bent = plan.pending.get(place, ()), plan.bent.get(place, ())
+        pending, bent = plan.pending.get(place, ()), plan.modal_rows.get(place, ())
         return replace(body, pending=tuple(pending), bent=tuple(bent)) if pending or bent else body
 
     return tuple(with_rows(place, body) for place, body in enumerate(bodies))

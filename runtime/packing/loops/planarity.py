@@ -55,7 +55,7 @@ def _rotations(system: System) -> tuple[list[Array], list[Array]]:
     """Rotations Rt (3, 3) of the hinges on the ground, and of those on bodies."""
     on_ground, on_bodies = list[Array](), list[Array]()
     for run in system.bodies:
-        for k, body in enumerate(run.alike):
+        for k, body in enumerate(run.members):
             rotation = np.reshape(body.connection[:9], (3, 3))
             (on_ground if k == 0 and run.parent == GROUND else on_bodies).append(rotation)
     return on_ground, on_bodies

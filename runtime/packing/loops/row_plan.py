@@ -41,11 +41,11 @@ class RowPlan:
     """
 
     def __init__(self, plan: ClosurePlan) -> None:
-        self.of: list[range] = [range(0)] * len(plan.groups)
+        self.rows_by_group: list[range] = [range(0)] * len(plan.groups)
         first = 0
         for closing in plan.closings:
             count = plan.groups[closing.group].count
-            self.of[closing.group], first = range(first, first + count), first + count
+            self.rows_by_group[closing.group], first = range(first, first + count), first + count
         self.rows = [row for closing in plan.closings for row in self._group_rows(closing)]
         self.pending = {
             body: self._row_numbers(groups) for body, groups in enumerate(plan.pending) if groups
@@ -57,10 +57,10 @@ class RowPlan:
         return [(number, other) for number, row in enumerate(self.rows) for other in row.others]
 
     def _row_numbers(self, groups: Sequence[int]) -> list[int]:
-        return sorted(row for group in groups for row in self.of[group])
+        return sorted(row for group in groups for row in self.rows_by_group[group])
 
     def _group_rows(self, closing: GroupClosure) -> list[Row]:
-        own, coupled = self.of[closing.group], self._row_numbers(closing.coupled)
+        own, coupled = self.rows_by_group[closing.group], self._row_numbers(closing.coupled)
         return [
             Row(closing.group, closing.body, (*own[k + 1 :], *coupled)) for k in range(len(own))
         ]

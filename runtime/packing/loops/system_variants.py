@@ -11,7 +11,7 @@ from ..bodies import RIGID
 from ..system import DIRECTIONS, Arrays, BodyNumbers, BodyRun, ClosureNumbers, System
 
 #: Gap of a redundant row, relative to the length of the scene, at which a rigid mechanism locks.
-LOCKED = 1e-3
+LOCKING_GAP_FRACTION = 1e-3
 #: Mass of the softest mode, relative to that of the scene, in `with_stiff_modes`.
 _MODAL_MASS = 1e8
 #: Radius of gyration of all bodies, relative to the length of the scene, in `with_unit_masses`.
@@ -22,8 +22,10 @@ def with_speeds_prescribed(system: System, places: Collection[int]) -> System:
     """Prescribe all speeds of the hinges at positions `places` in the tree, except of chains."""
     if not places:
         return system
-    runs = tuple(_with_prescribed_run(run) if run.place in places else run for run in system.bodies)
-    speeds = {run.place: run.alike[0].nu for run in runs if run.place in places}
+    runs = tuple(
+        _with_prescribed_run(run) if run.position in places else run for run in system.bodies
+    )
+    speeds = {run.position: run.members[0].nu for run in runs if run.position in places}
     closures = tuple(
         _with_prescribed_closure(closure, speeds[closure.frame])
         if closure.frame in places
@@ -36,8 +38,8 @@ def with_speeds_prescribed(system: System, places: Collection[int]) -> System:
 def _with_prescribed_run(run: BodyRun) -> BodyRun:
     if run.count != 1:
         return run
-    body = run.alike[0]
-    return replace(run, alike=(replace(body, imposed=(1,) * body.nu, release=-1),))
+    body = run.members[0]
+    return replace(run, members=(replace(body, imposed=(1,) * body.nu, release=-1),))
 
 
 def _with_prescribed_closure(closure: ClosureNumbers, speeds: int) -> ClosureNumbers:
@@ -58,7 +60,7 @@ def _with_directions(closure: ClosureNumbers, directions: tuple[int, ...]) -> Cl
 def with_coupling_values(system: System, values: Sequence[float]) -> System:
     """Set the constants of couplings that were unknown; `values` are for all couplings."""
     couplings = tuple(
-        replace(coupling, kept=float(value)) if coupling.kept is None else coupling
+        replace(coupling, constant=float(value)) if coupling.constant is None else coupling
         for coupling, value in zip(system.couplings, values, strict=True)
     )
     return replace(system, couplings=couplings)
@@ -70,16 +72,18 @@ def with_row_choice(system: System, counts: Mapping[int, int]) -> System:
     `counts` gives the number of active rows by the position of the closure's frame.  Memory holds
     whether each row is inactive, before the inputs held there.
     """
-    closures, first = list[ClosureNumbers](), system.held.first
+    closures, first = list[ClosureNumbers](), system.held_inputs.first
     for closure in system.closures:
         if closure.frame in counts:
             closure = replace(closure, choice=(first, counts[closure.frame]))
             first += DIRECTIONS
         closures.append(closure)
-    shift = first - system.held.first
-    places = tuple(place + shift * (place >= 0) for place in system.held.places)
-    held = replace(system.held, first=first, places=places)
-    return replace(system, closures=tuple(closures), held=held, n_memory=system.n_memory + shift)
+    shift = first - system.held_inputs.first
+    places = tuple(place + shift * (place >= 0) for place in system.held_inputs.memory_indices)
+    held = replace(system.held_inputs, first=first, memory_indices=places)
+    return replace(
+        system, closures=tuple(closures), held_inputs=held, n_memory=system.n_memory + shift
+    )
 
 
 def without_rows(
@@ -116,9 +120,9 @@ def with_drives_released(system: System) -> System:
 def _with_free_run(run: BodyRun, driven: Collection[tuple[int, int]]) -> BodyRun:
     if run.count != 1:
         return run
-    body = run.alike[0]
-    imposed = tuple(x and (run.place, k) not in driven for k, x in enumerate(body.imposed))
-    return replace(run, alike=(replace(body, imposed=tuple(map(int, imposed))),))
+    body = run.members[0]
+    imposed = tuple(x and (run.position, k) not in driven for k, x in enumerate(body.imposed))
+    return replace(run, members=(replace(body, imposed=tuple(map(int, imposed))),))
 
 
 def _with_free_closure(
@@ -131,7 +135,7 @@ def _with_free_closure(
 
 def with_loops_open(system: System) -> System:
     """Open the loops: a tree in which cut hinges carry massless frames."""
-    return replace(system, closures=(), couplings=(), coupled=None)
+    return replace(system, closures=(), couplings=(), coupling_kernel=None)
 
 
 def with_stiff_modes(system: System) -> System:
@@ -152,7 +156,7 @@ def with_stiff_modes(system: System) -> System:
         return replace(body, modal=replace(modal, moments=Arrays(moments)))
 
     runs = tuple(
-        replace(run, alike=tuple(map(with_modal_masses, run.alike))) for run in system.bodies
+        replace(run, members=tuple(map(with_modal_masses, run.members))) for run in system.bodies
     )
     return replace(system, bodies=runs)
 
@@ -192,18 +196,21 @@ def with_hinge_inertia(system: System, slides: Mapping[int, Collection[int]]) ->
 
 def with_rotors(system: System, inertia: Sequence[float]) -> System:
     """Add rotor inertia (nu,) to all hinges except the cut ones."""
-    frames, first = {closure.frame for closure in system.closures}, system.places["u"].tolist()
+    frames, first = (
+        {closure.frame for closure in system.closures},
+        system.first_indices["u"].tolist(),
+    )
 
     def with_rotor(body: BodyNumbers, place: int) -> BodyNumbers:
         pairs = zip(body.rotor, inertia[first[place] : first[place] + body.nu], strict=True)
         return replace(body, rotor=tuple(float(own + added) for own, added in pairs))
 
     def with_run_rotors(run: BodyRun) -> BodyRun:
-        last = len(run.alike) - 1
-        places = [run.place + (k if k < last else run.count - 1) for k in range(last + 1)]
-        return replace(run, alike=tuple(map(with_rotor, run.alike, places)))
+        last = len(run.members) - 1
+        places = [run.position + (k if k < last else run.count - 1) for k in range(last + 1)]
+        return replace(run, members=tuple(map(with_rotor, run.members, places)))
 
-    runs = tuple(run if run.place in frames else with_run_rotors(run) for run in system.bodies)
+    runs = tuple(run if run.position in frames else with_run_rotors(run) for run in system.bodies)
     return replace(system, bodies=runs)
 
 
@@ -220,10 +227,10 @@ def _with_bodies(system: System, change: Callable[[int, BodyNumbers], BodyNumber
     frames = {closure.frame for closure in system.closures}
 
     def with_changes(run: BodyRun) -> BodyRun:
-        alike = (change(run.place, body) if _is_rigid(body) else body for body in run.alike)
-        return replace(run, alike=tuple(alike))
+        alike = (change(run.position, body) if _is_rigid(body) else body for body in run.members)
+        return replace(run, members=tuple(alike))
 
-    runs = tuple(run if run.place in frames else with_changes(run) for run in system.bodies)
+    runs = tuple(run if run.position in frames else with_changes(run) for run in system.bodies)
     return replace(system, bodies=runs)
 
 

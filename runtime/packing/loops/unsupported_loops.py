@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 
 def reject_loops(packed: PackedScene, what: str, instead: str) -> None:
     """Raise SceneError if there are closed loops: `what` does not support them; use `instead`."""
-    if not packed.system.closes:
+    if not packed.system.has_loops:
         return
-    scene = packed.described.skeleton
+    scene = packed.user_scene.skeleton
     plan = build_topology(scene).plan
     assert plan is not None
     raise SceneError(
@@ -29,7 +29,7 @@ def reject_loops(packed: PackedScene, what: str, instead: str) -> None:
 
 def reject_speed_constraints(packed: PackedScene, method: str) -> None:
     """Raise SceneError if there are constraints on speeds, for a method on positions."""
-    scene = packed.described
+    scene = packed.user_scene
     names = [f'coupling "{c.name}"' for c in scene.coupling if c.speeds is not None]
     names += [f'constraint "{c.name}"' for c in scene.constraint if c.type == ROLLING]
     if names:
@@ -41,7 +41,7 @@ def reject_speed_constraints(packed: PackedScene, method: str) -> None:
 
 def reject_constraints(packed: PackedScene, what: str, instead: str) -> None:
     """Raise SceneError if there are constraints or couplings, which `what` does not support."""
-    scene = packed.described
+    scene = packed.user_scene
     names = [f'coupling "{coupling.name}"' for coupling in scene.coupling]
     names += [f'constraint "{constraint.name}"' for constraint in scene.constraint]
     if names:

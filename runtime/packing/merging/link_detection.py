@@ -16,7 +16,7 @@ def link_simplifications(runs: Iterable[BodyRun], names: Iterable[str]) -> list[
     """One record per kind of link, with the first hinge of every run; `names` are these hinges."""
     hinges_by_kernel: dict[str, list[tuple[str, int]]] = {}
     for run, name in zip(runs, names, strict=True):
-        if kernel := link_kernel(run.alike[0]):
+        if kernel := link_kernel(run.members[0]):
             hinges_by_kernel.setdefault(kernel, []).append((name, run.count))
     return [_simplification(kernel, hinges) for kernel, hinges in hinges_by_kernel.items()]
 

@@ -17,12 +17,12 @@ class ReferencedParts:
 
     Attributes:
         bodies: referenced by more than positions and velocities of their origin and ends.
-        places: referenced in any way.
+        frames: referenced in any way.
         hinges: released or referenced.
     """
 
     bodies: frozenset[str]
-    places: frozenset[str]
+    frames: frozenset[str]
     hinges: frozenset[str]
 
 

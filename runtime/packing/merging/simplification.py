@@ -16,19 +16,19 @@ from mstmm.errors import SceneError
 WELDS, TURNS, LINKS = "welds", "turns", "links"
 
 #: Kind -> singular, plural and description, for the kinds that are reported to users.
-COUNTED = {
+COUNT_TEXTS = {
     WELDS: ("body", "bodies", "on fixed hinges merged into their inboard body"),
     TURNS: ("orientation", "orientations", "within a tolerance of right angles replaced by these"),
 }
 #: Kind -> whether it is done, or up to which tolerance.
-Words = Mapping[str, bool | float]
+SimplifyOptions = Mapping[str, bool | float]
 #: Default simplifications, and the default of each kind.  The tolerance (rad) admits right angles
 #: written as 1.57079632679, which are off by 4.9e-12, and sums of two.  Numbers with fewer digits
 #: (1.570796327: 2e-10 off, 1.5708: 4e-6) change results by more than rounding, so that a larger
 #: tolerance must be requested.
-USUAL: Words = {WELDS: True, TURNS: 1e-11, LINKS: True}
-LINKED: Words = {LINKS: True}
-NOTHING: Words = {}
+USUAL: SimplifyOptions = {WELDS: True, TURNS: 1e-11, LINKS: True}
+LINKED: SimplifyOptions = {LINKS: True}
+NO_SIMPLIFICATION: SimplifyOptions = {}
 #: Largest tolerance, rad.
 _MAX_TOLERANCE = 0.01
 
@@ -51,13 +51,13 @@ class Simplification:
         return self.text
 
 
-def parse_simplify(simplify: bool | Collection[str] | Words) -> Words:
+def parse_simplify(simplify: bool | Collection[str] | SimplifyOptions) -> SimplifyOptions:
     """Parse the option `simplify`; kinds that a table does not name keep their defaults.
 
     Raises SceneError for unknown kinds and invalid values.
     """
     if isinstance(simplify, bool):
-        return USUAL if simplify else NOTHING
+        return USUAL if simplify else NO_SIMPLIFICATION
     kinds = require_texts("simplify", list(simplify) if isinstance(simplify, Mapping) else simplify,
                      "welds")  # fmt: skip
     for kind in kinds:

@@ -27,7 +27,9 @@ def end_pose(body: Body, at: str) -> Pose:
 def weld_pose(weld: Hinge, inboard: Body | None, outboard: Body) -> Pose:
     """Pose of the outboard body in the axes of the inboard one (None: the ground)."""
     end = Pose(weld.position) if inboard is None else end_pose(inboard, weld.inboard_end)
-    return end.then(Pose(ZERO, weld.rotation)).then(end_pose(outboard, weld.outboard_end).inverse)
+    return end.compose(Pose(ZERO, weld.rotation)).compose(
+        end_pose(outboard, weld.outboard_end).inverse
+    )
 
 
 def merged_body(whole: Body, part: Body, pose: Pose) -> Body:

@@ -27,31 +27,31 @@ class WeldedBodies:
     """Merged bodies, by their numbers in the scene of nodes.
 
     Attributes:
-        by: merged body -> its carrier, which is not merged itself.
+        carriers: merged body -> its carrier, which is not merged itself.
         poses: merged body -> its pose in the axes of the carrier.
         welds: merged body -> its fixed hinge.
     """
 
-    by: Mapping[int, int] = field(default_factory=dict)
+    carriers: Mapping[int, int] = field(default_factory=dict)
     poses: Mapping[int, Pose] = field(default_factory=dict)
     welds: Mapping[int, int] = field(default_factory=dict)
 
-    def placed(self, body: int, whole: Placement) -> Placement:
+    def pose_in_carrier(self, body: int, whole: Placement) -> Placement:
         """Internal frame `whole` of the carrier in the axes of a merged body."""
-        pose = self.poses[body].inverse.then(Pose(whole.origin, whole.rotation))
+        pose = self.poses[body].inverse.compose(Pose(whole.origin, whole.rotation))
         return Placement(pose.rotation, pose.position)
 
     @cached_property
     def parts(self) -> dict[int, list[int]]:
         """Carrier -> bodies merged into it."""
         parts: dict[int, list[int]] = {}
-        for body, carrier in self.by.items():
+        for body, carrier in self.carriers.items():
             parts.setdefault(carrier, []).append(body)
         return parts
 
-    def told(self, scene: Scene) -> Iterator[Simplification]:
+    def simplifications(self, scene: Scene) -> Iterator[Simplification]:
         """Records of all merged bodies."""
-        for body, carrier in self.by.items():
+        for body, carrier in self.carriers.items():
             weld, name = scene.hinge[self.welds[body]], scene.body[body].name
             carrier_name = scene.body[carrier].name
             yield Simplification(
@@ -72,7 +72,7 @@ def find_welded_bodies(expanded: ExpandedScene, tree: Topology) -> WeldedBodies:
     candidates = [run for run in tree.runs if _is_welded(run, expanded)]
     if not candidates or expanded.cuts or (rigidified is not None and rigidified.one_way):
         return WeldedBodies()
-    referenced_hinges = referenced_parts(expanded.described).hinges
+    referenced_hinges = referenced_parts(expanded.user_scene).hinges
     by, poses, welds = dict[int, int](), dict[int, Pose](), dict[int, int]()
     for run in candidates:
         weld, inboard, body = scene.hinge[run.hinge], scene.body[run.on], scene.body[run.body]
@@ -80,18 +80,18 @@ def find_welded_bodies(expanded: ExpandedScene, tree: Topology) -> WeldedBodies:
         if weld.name in referenced_hinges or not are_rigid:
             continue
         pose = weld_pose(weld, inboard, body)
-        poses[run.body] = poses[run.on].then(pose) if run.on in poses else pose
+        poses[run.body] = poses[run.on].compose(pose) if run.on in poses else pose
         by[run.body], welds[run.body] = by.get(run.on, run.on), run.hinge
     return WeldedBodies(by, poses, welds)
 
 
 def _is_welded(run: BodyRow, expanded: ExpandedScene) -> bool:
     """Whether a run is a body on a permanent fixed hinge of the user's scene to another body."""
-    scene, user_hinges = expanded.scene, len(expanded.described.hinge)
+    scene, user_hinges = expanded.scene, len(expanded.user_scene.hinge)
     if run.hinge >= user_hinges or not 0 <= run.on < len(scene.body):
         return False
     hinge = scene.hinge[run.hinge]
-    return hinge.is_weld and not hinge.lets_go
+    return hinge.is_weld and not hinge.is_released
 
 
 def _is_rigid(body: Body, expanded: ExpandedScene) -> bool:
@@ -101,14 +101,14 @@ def _is_rigid(body: Body, expanded: ExpandedScene) -> bool:
 
 def contract_tree(tree: Topology, carried: WeldedBodies) -> Topology:
     """Remove merged bodies from the tree; the others keep their order."""
-    if not carried.by:
+    if not carried.carriers:
         return tree
     places, runs, count = {GROUND: GROUND}, list[BodyRow](), 0
     for run in tree.runs:
-        if run.body in carried.by:
-            places[run.place] = places[run.parent]
+        if run.body in carried.carriers:
+            places[run.position] = places[run.parent]
             continue
-        runs.append(replace(run, place=count, parent=places[run.parent]))
-        places |= {run.place + k: count + k for k in range(run.count)}
+        runs.append(replace(run, position=count, parent=places[run.parent]))
+        places |= {run.position + k: count + k for k in range(run.count)}
         count += run.count
-    return replace(tree, runs=tuple(runs), carried=carried.by)
+    return replace(tree, runs=tuple(runs), carried=carried.carriers)

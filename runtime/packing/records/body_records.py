@@ -38,23 +38,23 @@ class BodyRecords:
         self.modal = ModalRecords(memory, lib)
         self._kernels_by_kind: dict[tuple[Key, Key, str], Any] = {}
         self.records = self._body_records()
-        memory.kept.append(self.records)
+        memory.keep_alive.append(self.records)
         self.blocks, blocks_end = self._block_offsets(lib)
-        columns = {"parent": system.parents, **system.places, "block": self.blocks}
+        columns = {"parent": system.parents, **system.first_indices, "block": self.blocks}
         for name, column in columns.items():
             self.records.write(name, column)
-        self.end = self.modal.begin(blocks_end)
+        self.end = self.modal.shift_offsets(blocks_end)
 
     def _body_records(self) -> CRecords:
         """Records of all bodies, still without their positions in the tree and in q and u."""
-        distinct = [(run.place, body) for run in self.system.bodies for body in run.alike]
+        distinct = [(run.position, body) for run in self.system.bodies for body in run.members]
         prototypes = CRecords(self.memory.ffi, "mstmm_body", len(distinct))
         for record, (place, body) in zip(prototypes.array, distinct, strict=False):
             self._fill(record, body, place)
         if len(distinct) == self.system.count:
             return prototypes
         records = CRecords(self.memory.ffi, "mstmm_body", self.system.count)
-        records.copy(slice(None), prototypes, self.system.which)
+        records.copy(slice(None), prototypes, self.system.distinct_indices)
         return records
 
     def _block_offsets(self, lib: Any) -> tuple[Integers, int]:
@@ -77,7 +77,7 @@ class BodyRecords:
         has_no_kernel = not self.elements[body.hinge].functions.get("condense")
         has_generic_speeds = any(body.imposed) or any(body.rotor)
         # Constraint rows and poses need the motion of the hinge, which is then computed once.
-        needs_motion = has_no_kernel or body.section is not None or self.system.closes
+        needs_motion = has_no_kernel or body.section is not None or self.system.has_loops
         record.generic = int(needs_motion or has_generic_speeds)
         record.kernels = self._kernels(body, needs_motion)
         if body.modal is not None:

@@ -77,7 +77,11 @@ def _position_reference(layout: Layout, event: Event, leaf: Element) -> tuple[in
     if leaf.port == "q":
         modal = {slots.q for slots in layout.modal.values()}
         for slots in layout.owners:
-            if slots.q <= index < slots.q + slots.nq and slots.straight and slots.q not in modal:
+            if (
+                slots.q <= index < slots.q + slots.nq
+                and slots.rates_are_speeds
+                and slots.q not in modal
+            ):
                 return index, slots.u + index - slots.q
     raise SceneError(
         f'event "{event.name}": do = "bounce" needs a condition on positions, or on hinge '

@@ -23,7 +23,7 @@ class Slopes:
     """Tapes of derivatives: their largest workspace, and references that keep them alive."""
 
     slots: int = 0
-    kept: list[Any] = field(default_factory=list)
+    keep_alive: list[Any] = field(default_factory=list)
 
 
 def write_slopes(system: System, model: Any, ffi: Any) -> Slopes:
@@ -36,10 +36,10 @@ def write_slopes(system: System, model: Any, ffi: Any) -> Slopes:
         ports = [port.name for port in kernel.inputs if port.name != INPUTS]
         slope = compile_tape(differentiate(kernel, ports, values=False, guards=False))
         slopes.slots = max(slopes.slots, slope.slots)
-        return c_tape(ffi, slope, slopes.kept)
+        return c_tape(ffi, slope, slopes.keep_alive)
 
     model.drive_slopes, model.value_slopes = tape(system.drives), tape(system.values)
-    model.coupling_slopes = tape(system.coupled)
+    model.coupling_slopes = tape(system.coupling_kernel)
     for k, force in enumerate(system.forces):
         model.forces[k].effort_slope = tape(force.effort)
     return slopes

@@ -18,7 +18,7 @@ class LawRecords:
     def __init__(self, system: System, memory: Memory) -> None:
         self.memory, self.functions = memory, prebuilt_kernels.element("sweep", "laws").functions
         self.records = CRecords(memory.ffi, "mstmm_law", sum(run.count for run in system.laws))
-        memory.kept.append(self.records)
+        memory.keep_alive.append(self.records)
         first = 0
         for run in system.laws:
             self._fill_run(run, first)
@@ -26,7 +26,7 @@ class LawRecords:
 
     def _fill_run(self, run: LawRun, first: int) -> None:
         if run.count == len(run.pattern):
-            for number, (law, body, twist, efforts) in enumerate(run.each(), first):
+            for number, (law, body, twist, efforts) in enumerate(run.iterate_laws(), first):
                 record = self.records.array[number]
                 self._fill(record, law)
                 record.body, record.twist = body, twist
@@ -41,12 +41,14 @@ class LawRecords:
         member = np.array([law.member for law in run.pattern])[k_in_pattern]
         turn = np.array([law.turn for law in run.pattern])[k_in_pattern]
         column = self.records.column
-        column("body")[numbers] = run.place + repeats * run.period + member
-        column("twist")[numbers] = np.where(turn < 0, -1, run.twist + repeats * run.turns + turn)
+        column("body")[numbers] = run.position + repeats * run.period + member
+        column("twist")[numbers] = np.where(
+            turn < 0, -1, run.twist + repeats * run.rotation_count + turn
+        )
         for k, law in enumerate(run.pattern):
             pointers = column("effort")[numbers][k :: len(run.pattern)]
             indices = np.array(law.efforts, dtype=np.int32)
-            self.memory.kept.append(indices)
+            self.memory.keep_alive.append(indices)
             pointers[:] = indices.ctypes.data
             if len(indices) > 1:
                 pointers += indices.strides[0] * np.arange(len(pointers), dtype=pointers.dtype)

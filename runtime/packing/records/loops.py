@@ -15,9 +15,9 @@ from mstmm.graph.mechanism_graph import GROUND
 from ...kernels.c_records import CRecords
 from ..loops.flexible_row_plan import FlexibleRowPlan
 from ..loops.row_plan import row_groups
-from ..loops.system_variants import LOCKED, characteristic_length
+from ..loops.system_variants import LOCKING_GAP_FRACTION, characteristic_length
 from ..system import ClosureNumbers, System
-from .couplings import WrittenCoupling, attach_couplings, place_couplings
+from .couplings import WrittenCoupling, assign_couplings, attach_couplings
 from .memory import Memory
 
 
@@ -62,37 +62,39 @@ class LoopRecords:
         couplings: tuple[WrittenCoupling, ...],
         of_bodies: CRecords,
     ) -> None:
-        self.place, self.closures, self.couplings, self._rows = place, closures, couplings, rows
-        self.of_bodies = of_bodies
+        self.offset, self.closures, self.couplings, self._rows = place, closures, couplings, rows
+        self.body_records = of_bodies
         self.count = len(plan.rows)
         self.width = max(map(len, plan.pending.values()), default=0)
-        self.chosen = [row for row in range(self.count) if rows[row].rest >= 0]
+        self.optional_rows = [row for row in range(self.count) if rows[row].rest >= 0]
 
-    def yields(self, row: int) -> bool:
+    def is_rotor_row(self, row: int) -> bool:
         """Whether a row is that of a rotor."""
         return bool(self._rows[row].softness > 0)
 
-    def resting(self, memory: Array) -> NDArray[np.bool_]:
+    def inactive_rows(self, memory: Array) -> NDArray[np.bool_]:
         """Mask (rows,) of the rows that are inactive according to memory."""
         inactive = np.zeros(self.count, bool)
-        inactive[self.chosen] = memory[[self._rows[row].rest for row in self.chosen]] > 0
+        inactive[self.optional_rows] = (
+            memory[[self._rows[row].rest for row in self.optional_rows]] > 0
+        )
         return inactive
 
     def scale(self, row: int, mobility: float) -> None:
         """Set the mobility of a row, its scale in regularised solutions."""
         self._rows[row].mobility = mobility
 
-    def judge(self, row: int, floor: float) -> None:
+    def set_pivot_floor(self, row: int, floor: float) -> None:
         """Set the pivot of a row below which it counts as rounding."""
         self._rows[row].floor = floor
 
-    def judge_as(self, other: LoopRecords) -> None:
+    def copy_pivot_floors(self, other: LoopRecords) -> None:
         """Copy the pivot floors of all rows in common with other records of the same loops."""
         for own, reference in zip(self.closures, other.closures, strict=True):
             for direction in own.rows.keys() & reference.rows.keys():
-                self.judge(own.rows[direction], other.floor(reference.rows[direction]))
+                self.set_pivot_floor(own.rows[direction], other.floor(reference.rows[direction]))
         for coupling, same in zip(self.couplings, other.couplings, strict=True):
-            self.judge(coupling.row, other.floor(same.row))
+            self.set_pivot_floor(coupling.row, other.floor(same.row))
 
     def floor(self, row: int) -> float:
         """Pivot of a row below which it counts as rounding."""
@@ -111,7 +113,7 @@ def attach_loops(
 
     Returns the offset behind them, and the records.
     """
-    if not system.closes:
+    if not system.has_loops:
         return place, None
     return _LoopWriter(model, system, memory, lib).write(place)
 
@@ -120,12 +122,12 @@ class _RecordPool:
     """Records of one kind side by side, in the order in which a sweep reads them."""
 
     def __init__(self, memory: Memory, kind: str, count: int) -> None:
-        self.records, self.used = memory.new(f"{kind}[]", max(1, count)), 0
+        self.records, self.used_count = memory.new(f"{kind}[]", max(1, count)), 0
 
-    def take(self, count: int) -> Any:
+    def next_records(self, count: int) -> Any:
         """Pointer to the next `count` records."""
-        self.used += count
-        return self.records + (self.used - count)
+        self.used_count += count
+        return self.records + (self.used_count - count)
 
 
 class _LoopWriter:
@@ -152,13 +154,13 @@ class _LoopWriter:
                 start += 6
         #: (body, row) -> offset of the row's column on the modes of the body.
         self.modes: dict[tuple[int, int], int] = {}
-        for body, rows in self.plan.bent.items():
+        for body, rows in self.plan.modal_rows.items():
             for row in rows:
                 self.modes[body, row] = start
                 start += self._mode_count(body)
-        self.summed = self.end = start
+        self.sums_offset = self.end_offset = start
         pending_counts = [len(rows) for _, rows in self.pending]
-        pending_counts += map(len, self.plan.bent.values())
+        pending_counts += map(len, self.plan.modal_rows.values())
         coupled_counts = [len(row.others) for row in self.plan.rows]
         pair_count = sum(n * (n + 1) // 2 for n in (*pending_counts, *coupled_counts))
         self.pools = {
@@ -173,10 +175,10 @@ class _LoopWriter:
         """Write the records; returns the offset behind all numbers, and the records."""
         model, memory = self.model, self.memory
         records_of_bodies = CRecords(memory.ffi, "mstmm_looped", self.system.count)
-        memory.kept.append(records_of_bodies)
+        memory.keep_alive.append(records_of_bodies)
         looped = records_of_bodies.array
-        coupling_rows = [rows[0] for rows in self.plan.of[len(self.system.closures) :]]
-        couplings = place_couplings(model, self.system, coupling_rows, self._reserve)
+        coupling_rows = [rows[0] for rows in self.plan.rows_by_group[len(self.system.closures) :]]
+        couplings = assign_couplings(model, self.system, coupling_rows, self._reserve)
         self.coupled = {
             (hinge, coupling.row): column
             for coupling in couplings if coupling.row >= 0
@@ -185,7 +187,7 @@ class _LoopWriter:
         for body, rows in self.pending:
             looped[body].n_pending = len(rows)
             looped[body].pending = self._pending_records(body, rows)
-        for body, rows in self.plan.bent.items():
+        for body, rows in self.plan.modal_rows.items():
             looped[body].n_bent = len(rows)
             looped[body].bent = self._modal_records(body, rows)
         records = memory.new("mstmm_loop_row[]", max(1, len(self.plan.rows)))
@@ -215,13 +217,13 @@ class _LoopWriter:
         model.looped, model.rows, model.n_rows = looped, records, len(self.plan.rows)
         model.closures = self.pools["mstmm_closure"].records
         model.n_closures = len(self.system.closures)
-        model.loops, model.loops_summed = place, self.summed
+        model.loops, model.loops_summed = place, self.sums_offset
         model.answer = place + self._reserve(self.system.nu)
-        model.loops_apart = LOCKED * characteristic_length(self.system)
+        model.loops_apart = LOCKING_GAP_FRACTION * characteristic_length(self.system)
         closures = tuple(written[group] for group in sorted(written))
         with_rows = tuple(coupling for coupling in couplings if coupling.row >= 0)
         loops = LoopRecords(place, self.plan, records, closures, with_rows, records_of_bodies)
-        return place + self.end, loops
+        return place + self.end_offset, loops
 
     def _closures_in_tree_order(self) -> list[tuple[int, ClosureNumbers]]:
         """(group, closure) in the order in which a forward pass reaches both bodies of each."""
@@ -231,8 +233,8 @@ class _LoopWriter:
 
     def _reserve(self, count: int) -> int:
         """Offset of `count` new numbers."""
-        first = self.end
-        self.end += count
+        first = self.end_offset
+        self.end_offset += count
         return first
 
     def _column(self, body: int, row: int) -> int:
@@ -247,13 +249,13 @@ class _LoopWriter:
 
     def _entries(self, row: int, others: Sequence[int]) -> Any:
         """Pointer to the offsets of the entries of L of a row with others."""
-        offsets = self.pools["int"].take(len(others))
+        offsets = self.pools["int"].next_records(len(others))
         offsets[0 : len(others)] = [self._entry(row, other) for other in others]
         return offsets
 
     def _pending_records(self, body: int, rows: list[int]) -> Any:
         """Records of the rows that pass the inboard hinge of a body."""
-        records = self.pools["mstmm_pending"].take(len(rows))
+        records = self.pools["mstmm_pending"].next_records(len(rows))
         speeds = self.system.body(body).nu
         for k, row in enumerate(rows):
             records[k].row = row
@@ -267,7 +269,7 @@ class _LoopWriter:
 
     def _modal_records(self, body: int, rows: list[int]) -> Any:
         """Records of the rows that pass the modes of a flexible body."""
-        records = self.pools["mstmm_pending"].take(len(rows))
+        records = self.pools["mstmm_pending"].next_records(len(rows))
         for k, row in enumerate(rows):
             records[k].row = row
             records[k].column = self._column(body, row)
@@ -282,7 +284,7 @@ class _LoopWriter:
 
     def _coupled_records(self, body: int, others: tuple[int, ...], number: int) -> Any:
         """Records of the open rows that row `number`, which closes on `body`, is coupled with."""
-        records = self.pools["mstmm_other"].take(len(others))
+        records = self.pools["mstmm_other"].next_records(len(others))
         for k, other in enumerate(others):
             records[k].row = other
             records[k].column = self._column(body, other)
@@ -293,7 +295,7 @@ class _LoopWriter:
     def _write_closure(
         self, group: int, closure: ClosureNumbers, rows: Any
     ) -> tuple[Any, WrittenClosure]:
-        record = self.pools["mstmm_closure"].take(1)
+        record = self.pools["mstmm_closure"].next_records(1)
         record.frame, record.outboard = closure.frame, closure.outboard
         record.turn, record.end = list(closure.turn), list(closure.end)
         record.kind = getattr(self.lib, f"MSTMM_{closure.kind.upper()}")
@@ -304,11 +306,11 @@ class _LoopWriter:
         frame, row_by_direction = self.system.body(closure.frame), dict[int, int]()
         inboard = self.parents[closure.frame]
         for k, direction in enumerate(closure.directions):
-            row = self.plan.of[group][k]
+            row = self.plan.rows_by_group[group][k]
             record.rows[direction] = row_by_direction[direction] = row
             record.inner[direction] = self._side_column(inboard, row)
             record.outer[direction] = self._side_column(closure.outboard, row)
-            rows[row].of_speeds = int(direction in closure.of_speeds)
+            rows[row].of_speeds = int(direction in closure.speed_directions)
             if direction >= frame.nu:
                 continue
             if frame.imposed[direction]:
@@ -324,7 +326,7 @@ class _LoopWriter:
         if closure.choice is None:
             return False
         first, count = closure.choice
-        own_rows = [row for row in self.plan.of[group] if not rows[row].softness]
+        own_rows = [row for row in self.plan.rows_by_group[group] if not rows[row].softness]
         choice = self.memory.new("mstmm_choice *")
         choice.n, choice.count = len(own_rows), count
         for i, row in enumerate(own_rows):

@@ -21,19 +21,20 @@ _BLOCK_LENGTH = 4096
 class Memory:
     """Allocator of C arrays, tapes and records.
 
-    `kept` are the references that keep them alive, `slots` is the largest workspace of a tape.
+    `keep_alive` are the references that keep them alive, `slots` is the largest workspace of a
+    tape.
     """
 
     def __init__(self, ffi: Any) -> None:
         self.ffi, self.slots = ffi, 0
-        self.kept: list[Any] = []
+        self.keep_alive: list[Any] = []
         #: C type -> current block, and the length used.
         self._blocks: dict[str, tuple[Any, int]] = {}
 
     def new(self, kind: str, given: Any = None) -> Any:
         """Allocate a record or an array of them."""
         data = self.ffi.new(kind) if given is None else self.ffi.new(kind, given)
-        self.kept.append(data)
+        self.keep_alive.append(data)
         return data
 
     def reals(self, numbers: Sequence[float]) -> Any:
@@ -56,13 +57,13 @@ class Memory:
     def array(self, numbers: Array) -> Any:
         """Pointer `real *` to the entries of an array, row by row."""
         flat = np.ascontiguousarray(np.ravel(numbers) if np.size(numbers) else [0.0], dtype=float)
-        self.kept.append(flat)
+        self.keep_alive.append(flat)
         return self.ffi.from_buffer("real[]", flat)
 
     def tape(self, tape: Tape) -> Any:
         """Pointer `mstmm_tape *` to a copy of the tape."""
         self.slots = max(self.slots, tape.slots)
-        return c_tape(self.ffi, tape, self.kept)
+        return c_tape(self.ffi, tape, self.keep_alive)
 
     def expression(self, kernel: KernelIR | None) -> Any:
         """Tape of a kernel of expressions; NULL without one."""

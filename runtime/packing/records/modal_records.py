@@ -54,7 +54,7 @@ class ModalRecords:
         self._sections[place] = record
         return record
 
-    def begin(self, first: int) -> int:
+    def shift_offsets(self, first: int) -> int:
         """Shift all offsets to begin at `first`; returns the offset behind the numbers."""
         for offsets, records in ((self.modal, self._modal), (self.sections, self._sections)):
             for place, record in records.items():

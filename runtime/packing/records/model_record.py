@@ -10,7 +10,7 @@ from mstmm.array_validation import Integers
 from mstmm.numerics.piecewise_polynomial import PiecewisePolynomial
 
 from ...kernels import prebuilt_kernels
-from ..load_coupling import Reach, load_coupling
+from ..load_coupling import LoadDependence, load_coupling
 from ..loops.planarity import motion_plane
 from ..scene_elements import Elements
 from ..system import ForceNumbers, LoadNumbers, System
@@ -27,23 +27,23 @@ class Written:
     """Model record with its memory, and the layout of the workspace.
 
     Attributes:
-        kept: references that keep the memory of the records alive.
+        keep_alive: references that keep the memory of the records alive.
         blocks, modal, sections: offsets of the numbers of bodies, flexible bodies and sections, by
             position in the tree.
         scratch: offset behind them.
         slots: largest workspace of a tape.
-        reach: dependence of the loads on the motion of bodies.
+        load_dependence: dependence of the loads on the motion of bodies.
         loops: records of the closed loops, None without any.
     """
 
     model: Any
-    kept: list[Any]
+    keep_alive: list[Any]
     blocks: Integers
     modal: dict[int, int]
     sections: dict[int, int]
     scratch: int
     slots: int
-    reach: Reach
+    load_dependence: LoadDependence
     loops: LoopRecords | None
 
 
@@ -53,7 +53,7 @@ def write_model(system: System, elements: Elements) -> Written:
     memory = Memory(ffi)
     model = memory.new("mstmm_model *")
     model.nq, model.nu, model.n_memory = system.nq, system.nu, system.n_memory
-    model.strained = system.strained
+    model.strained = system.strain_index
     model.gravity = list(system.gravity)
     bodies = BodyRecords(system, elements, memory, lib)
     model.bodies, model.n_bodies = bodies.records.array, system.count
@@ -67,7 +67,7 @@ def write_model(system: System, elements: Elements) -> Written:
     laws = LawRecords(system, memory)
     model.laws, model.n_laws = laws.records.array, laws.records.count
     reach = load_coupling(system)
-    for place in reach.placed:
+    for place in reach.own_load_bodies:
         bodies.records.array[place].placed = 1
     loads = memory.new("mstmm_load[]", max(1, len(system.loads)))
     for record, load, is_own in zip(loads, system.loads, reach.loads, strict=False):
@@ -79,21 +79,23 @@ def write_model(system: System, elements: Elements) -> Written:
         _fill_force(record, force, elements, memory)
         record.own = int(is_own)
     model.forces, model.n_forces = forces, len(system.forces)
-    model.needs_pose = int(bool(system.forces or system.loads or system.dragged or system.closes))
-    model.inputs = write_inputs(system.inputs, system.held.places, memory)
+    model.needs_pose = int(
+        bool(system.forces or system.loads or system.bodies_with_drag or system.has_loops)
+    )
+    model.inputs = write_inputs(system.inputs, system.held_inputs.memory_indices, memory)
     model.n_inputs = len(system.inputs)
     model.n_values, model.value_tape = system.n_values, memory.expression(system.values)
     offset, loops = attach_loops(model, system, memory, lib, bodies.end)
     axes = motion_plane(system, elements)
     if loops is not None and axes is not None:
         offset = attach_planar_bodies(
-            model, system, elements, memory, lib, loops.of_bodies, axes, offset
+            model, system, elements, memory, lib, loops.body_records, axes, offset
         )
     scratch = attach_runs(model, system, memory, lib, offset)
     modal = bodies.modal
     return Written(
         model,
-        memory.kept,
+        memory.keep_alive,
         bodies.blocks,
         modal.modal,
         modal.sections,

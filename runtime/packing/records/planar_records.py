@@ -17,7 +17,7 @@ from ..scene_elements import Elements
 from ..system import BodyNumbers, Numbers, System
 from .memory import Memory
 
-_OF_LOOPS = ("first_row", "n_rows", "n_pending", "pending")
+_LOOP_FIELDS = ("first_row", "n_rows", "n_pending", "pending")
 
 
 def attach_planar_bodies(
@@ -45,14 +45,14 @@ def attach_planar_bodies(
         record.given = shared[numbers]
         record.idle = record.aside = int(body.idle)
     records = CRecords(memory.ffi, "mstmm_flat_body", system.count)
-    records.copy(slice(None), prototypes, system.which)
-    places = system.places
+    records.copy(slice(None), prototypes, system.distinct_indices)
+    places = system.first_indices
     for name, column in {"parent": system.parents, "q": places["q"], "u": places["u"]}.items():
         records.write(name, column)
-    for name in _OF_LOOPS:
+    for name in _LOOP_FIELDS:
         records.column(name)[:] = looped.column(name)
     records.column("aside")[[closure.frame for closure in system.closures]] = 1
-    memory.kept.append(records)
+    memory.keep_alive.append(records)
     model.flat, model.flat_numbers = records.array, place
     model.flat_gravity = (axes.T @ system.gravity)[:2].tolist()
     return place + int(lib.MSTMM_FLAT) * (1 + system.count)
@@ -61,7 +61,7 @@ def attach_planar_bodies(
 def _bodies_in_plane(system: System, axes: Array) -> Iterator[BodyNumbers]:
     """Distinct bodies, with connections to the ground in the axes of the plane."""
     for run in system.bodies:
-        for k, body in enumerate(run.alike):
+        for k, body in enumerate(run.members):
             if k or run.parent != GROUND:
                 yield body
                 continue

@@ -22,13 +22,13 @@ def trial_rotors(written: Written) -> Iterator[Callable[[int], None]]:
     model = written.model
     posed, model.needs_pose = model.needs_pose, 1
 
-    def give(place: int) -> None:
+    def add_rotor(place: int) -> None:
         record = model.bodies[place]
         before[place] = (record.rotor, int(record.generic))
         record.rotor, record.generic = rotor, 1
 
     try:
-        yield give
+        yield add_rotor
     finally:
         model.needs_pose = posed
         for place, (old, generic) in before.items():

@@ -43,9 +43,9 @@ class _NotInColumnsError(SceneError, AttributeError):
 class ColumnFile:
     """Result that was saved without its scene: columns by name.
 
-    `t` (n,) in s and `event` (n,) are as in `Result`, and so are `names`, `quantity`, `plot`,
-    `table` and `save` (".csv", ".mat"). All other attributes of a `Result` raise SceneError, with a
-    remedy.
+    `t` (n,) in s and `event` (n,) are as in `Result`, and so are `quantity_names`, `quantity`,
+    `plot`, `table` and `save` (".csv", ".mat"). All other attributes of a `Result` raise
+    SceneError, with a remedy.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class ColumnFile:
         #: Further attributes of a `Result`, not available here.
         self.lost: frozenset[str] = frozenset()
 
-    def names(self) -> tuple[str, ...]:
+    def quantity_names(self) -> tuple[str, ...]:
         """All names that `quantity` accepts."""
         return tuple(self._columns)
 
@@ -90,7 +90,7 @@ class ColumnFile:
         hint = did_you_mean(name, self._columns)
         raise SceneError(f'"{name}": there is no such column in {self.path}{hint}')
 
-    def candidates(self) -> list[Candidate]:
+    def default_quantities(self) -> list[Candidate]:
         """Columns with a rate; without any, all angles and lengths, or all columns."""
         coordinates = [name for name in self._columns if f"{name}_rate" in self._columns]
         lengths = [name for name, (unit, _) in self._columns.items() if unit in ("rad", "m")]
@@ -117,7 +117,8 @@ class ColumnFile:
         path = require_path("result file", path)
         if path.suffix.lower() not in TABLES:
             raise SceneError(
-                f'result file "{path}": columns without their scene go into .csv and .mat files'
+                f'result file "{path}": columns without their scene can be saved as .csv or .mat '
+                "only"
             )
         return write_table(self.t, self.event, self.scalars(), path)
 
@@ -133,7 +134,7 @@ class ColumnFile:
         if name.startswith("_") or name not in self.__dict__.get("lost", ()):
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
         raise _NotInColumnsError(
-            f'"{name}" needs the scene of the run, and {self.path} holds its columns alone; save '
+            f'"{name}" needs the scene of the run, but {self.path} contains columns only; save '
             "the result as .nc, or run it again"
         )
 
@@ -190,10 +191,10 @@ def read_mat(path: Path) -> ColumnFile:
 
 
 def _build_columns(
-    path: Path, t: Array, event: Array, found: Mapping[str, tuple[str, Array]]
+    path: Path, t: Array, event: Array, columns_found: Mapping[str, tuple[str, Array]]
 ) -> ColumnFile:
     """Columns of a file, if it can be that of a run."""
-    columns = [t, event, *(values for _, values in found.values())]
+    columns = [t, event, *(values for _, values in columns_found.values())]
     if any(len(column) != len(t) for column in columns):
         raise _file_error(path, "its columns are not equally long")
     if any(column.dtype.kind not in "buif" for column in columns):
@@ -202,7 +203,7 @@ def _build_columns(
         raise _file_error(path, "its times are not finite numbers, none before another")
     if not (np.isfinite(event) & (np.abs(event) < _MAX_EVENT) & (event == np.round(event))).all():
         raise _file_error(path, "its events are not whole numbers")
-    return ColumnFile(path, t, event.astype(np.int64), found)
+    return ColumnFile(path, t, event.astype(np.int64), columns_found)
 
 
 def _file_error(path: Path, why: str) -> SceneError:

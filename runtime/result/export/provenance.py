@@ -5,13 +5,14 @@ from __future__ import annotations
 import hashlib
 import json
 import platform
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mstmm import risk, version
 from mstmm.array_validation import Array
+from mstmm.plain_data import from_plain, to_plain
 
 from ...classical.integration_schemes import parse_scheme
 from ...integrate.achieved_error import from_dict
@@ -30,7 +31,11 @@ if TYPE_CHECKING:
 #: Version of the layout of a saved result.
 FORMAT = 1
 
-_ERROR_ATTRIBUTES = ("horizon", "tenfold", "reference", "moved", "covered")
+#: Fields of an error estimate, by the names of their attributes in the file.
+_ERROR_ATTRIBUTES = {
+    "horizon": "divergence_time", "tenfold": "tenfold_time", "reference": "reference",
+    "moved": "excursion", "covered": "covered",
+}  # fmt: skip
 
 Variable = tuple[tuple[str, ...], Any, dict[str, str]]
 
@@ -67,14 +72,16 @@ def file_attributes(result: Record) -> dict[str, Any]:
         "status": "INTERRUPTED" if run.status is None else run.status.name,
         "success": int(result.success),
         "message": run.message,
-        "statistics": json.dumps(None if run.statistics is None else asdict(run.statistics)),
+        "statistics": json.dumps(to_plain(run.statistics)),
         "fail_time": np.nan if run.fail_time is None else run.fail_time,
         "notes": json.dumps(list(run.notes)),
         "risks": json.dumps(risk.to_rows(result.risks)),
         "known_risks": json.dumps(risk.to_rows(run.risks)),
-        "told": int(run.told),
-        "methods": json.dumps([asdict(stretch) for stretch in run.methods]),
-        "error_estimate": json.dumps(None if run.reached is None else run.reached.to_dict()),
+        "told": int(run.reported_risks),
+        "methods": json.dumps(to_plain(run.methods)),
+        "error_estimate": json.dumps(
+            None if run.achieved_error is None else run.achieved_error.to_dict()
+        ),
         "norm_residual": run.norm_residual,
         "certificate": str(result.certificate),
     }
@@ -83,7 +90,7 @@ def file_attributes(result: Record) -> dict[str, Any]:
 def provenance_variables(result: Record) -> dict[str, Variable]:
     """Provenance that is too long for an attribute, or has its own dimension."""
     run = result.trajectory
-    scene = {"long_name": "scene as TOML, defaults filled in"}
+    scene = {"long_name": "scene as TOML, including defaults"}
     event = {"long_name": "-(i + 1) just before, i + 1 just after event i"}
     memory = {"long_name": "memory: releases, turns of ball and free hinges"}
     file_variables: dict[str, Variable] = {
@@ -91,17 +98,17 @@ def provenance_variables(result: Record) -> dict[str, Variable]:
         "event": (("time",), run.event, event),
         "memory": (("time", "memory_place"), run.memory, memory),
     }
-    if run.last is not None:
+    if run.last_state is not None:
         description = {"units": "s", "long_name": "time of the last good state"}
-        file_variables["last_t"] = ((), run.last[0], description)
+        file_variables["last_t"] = ((), run.last_state[0], description)
         file_variables["last_q"] = (
             ("coordinate",),
-            run.last[1],
+            run.last_state[1],
             {"long_name": "q of the last good state"},
         )
         file_variables["last_u"] = (
             ("speed",),
-            run.last[2],
+            run.last_state[2],
             {"long_name": "u of the last good state"},
         )
     if run.start is not None:
@@ -109,12 +116,12 @@ def provenance_variables(result: Record) -> dict[str, Variable]:
             file_variables[f"start_{name}"] = (
                 (dimension,),
                 values,
-                {"long_name": f"{name} at the beginning"},
+                {"long_name": f"initial {name}"},
             )
     file_variables |= _error_variables(result.certificate.error)
     if run.settings.output_times is not None:
         times = np.array(run.settings.output_times)
-        description = {"units": "s", "long_name": "output times asked for"}
+        description = {"units": "s", "long_name": "requested output times"}
         file_variables["output_times"] = (("output_time",), times, description)
     return file_variables
 
@@ -123,7 +130,7 @@ def _error_variables(error: ErrorEstimate | None) -> dict[str, Variable]:
     """Estimated error over time, one column per unit."""
     if error is None:
         return {}
-    long_name = "times that both runs reached"
+    long_name = "times of both runs"
     result: dict[str, Variable] = {
         "error_t": (("error_time",), error.t, {"units": "s", "long_name": long_name})
     }
@@ -131,7 +138,9 @@ def _error_variables(error: ErrorEstimate | None) -> dict[str, Variable]:
         for k, (unit, values) in enumerate(getattr(error, kind).items()):
             long_name = f"estimated error of {kind}, largest so far"
             description = {"units": unit or "1", "long_name": long_name}
-            description |= {name: json.dumps(getattr(error, name)) for name in _ERROR_ATTRIBUTES}
+            description |= {
+                key: json.dumps(getattr(error, name)) for key, name in _ERROR_ATTRIBUTES.items()
+            }
             result[f"error_{kind}_{k}"] = (("error_time",), values, description)
     return result
 
@@ -147,9 +156,9 @@ def error_estimate(data: Any) -> ErrorEstimate | None:
         values[str(name)[6]]["" if unit == "1" else unit] = data[name].values
     first_attributes = data[columns[0]].attrs
     other_fields = {
-        name: json.loads(first_attributes[name])
-        for name in _ERROR_ATTRIBUTES
-        if name in first_attributes
+        name: json.loads(first_attributes[key])
+        for key, name in _ERROR_ATTRIBUTES.items()
+        if key in first_attributes
     }
     return ErrorEstimate(data["error_t"].values, values["q"], values["u"], **other_fields)
 
@@ -165,21 +174,21 @@ def _read_floats(data: Any, name: str) -> Array:
 def _require_number(value: Any) -> Any:
     """Require a number, a bool or None, and return it."""
     if value is not None and not isinstance(value, (int, float)):
-        raise TypeError(f"{value!r} stands where a number was")
+        raise TypeError(f"{value!r} found, expected a number")
     return value
 
 
-def _read_settings(found: dict[str, Any]) -> Settings:
+def _read_settings(stored: dict[str, Any]) -> Settings:
     """Settings from saved values; TypeError for values of the wrong type."""
-    for name, value in found.items():
+    for name, value in stored.items():
         if name not in ("method", "output_times", "scheme", "tangent"):
             _require_number(value)
-    method = found["method"]
+    method = stored["method"]
     if method not in (AUTO, *external_integrators.METHODS, *classical_run.METHODS):
         get(method)
     if method in classical_run.METHODS:
-        parse_scheme(found.get("scheme", ""))
-    return Settings(**found)
+        parse_scheme(stored.get("scheme", ""))
+    return Settings(**stored)
 
 
 def read_trajectory(data: Any) -> Trajectory:
@@ -192,11 +201,8 @@ def read_trajectory(data: Any) -> Trajectory:
     settings = _read_settings(json.loads(a["settings"]) | {"output_times": times})
     statistics = json.loads(a["statistics"])
     if statistics is not None:
-        newer_counts = ("crossings", "residuals", "tangents", "solves", "iterations",
-                 "laws_tangents")  # fmt: skip
-        counts = dict.fromkeys(newer_counts, 0) | statistics  # missing in older files
-        statistics = Statistics(
-            **{f.name: _require_number(counts[f.name]) for f in fields(Statistics)}
+        statistics = from_plain(
+            Statistics, {key: _require_number(count) for key, count in statistics.items()}
         )
     status = None if a["status"] == "INTERRUPTED" else Status[a["status"]]
     fail_time = None if np.isnan(a["fail_time"]) else float(a["fail_time"])

@@ -32,10 +32,10 @@ def save_result(result: Record, path: Path) -> Path:
     return write_table(result.t, result.event, quantities, path, result.model.scene.to_toml())
 
 
-def save_dataset(made: Callable[[], Any], path: Path) -> Path:
+def save_dataset(build_dataset: Callable[[], Any], path: Path) -> Path:
     """Write a Dataset as NetCDF, followed by its hash."""
     with replace_atomically(path) as temporary:
-        _write_netcdf(made(), temporary)
+        _write_netcdf(build_dataset(), temporary)
     return path
 
 

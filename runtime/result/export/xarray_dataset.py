@@ -77,11 +77,11 @@ def _attributes(unit: str, long_name: str) -> dict[str, str]:
 
 def _common_unit(units: list[str]) -> str:
     """Unit of an array whose columns may have different units."""
-    return (units[0] or "1") if len(set(units)) == 1 else "see the units beside the labels"
+    return (units[0] or "1") if len(set(units)) == 1 else "see the units of the labels"
 
 
 def _dimension_labels(result: Record) -> dict[str, Variable]:
-    layout = result.model.layout
+    layout = result.model.coordinate_layout
     owners = list(layout.owners)
     q_units = [unit or "1" for h in owners for unit in h.q_units]
     u_units = [unit or "1" for h in owners for unit in h.u_units]
@@ -94,7 +94,7 @@ def _dimension_labels(result: Record) -> dict[str, Variable]:
         "acceleration_name": ("speed", udot, "name of the speed's rate"),
         "effort_units": ("speed", [effort_unit(u) for u in u_units], "unit of the effort"),
         "hinge": ("hinge", list(layout.hinges), "hinge"),
-        "body": ("body", list(result._observed.references), "body or end of a body"),
+        "body": ("body", list(result._observations.references), "body or end of a body"),
         "axis": ("axis", ["x", "y", "z"], "inertial axis"),
         "component": ("component", ["w", "x", "y", "z"], "component of a quaternion"),
         "angle": ("angle", list(EULER_KIND.labels), EULER_KIND.long_name),
@@ -107,12 +107,12 @@ def _dimension_labels(result: Record) -> dict[str, Variable]:
 
 
 def _state_variables(result: Record) -> dict[str, Variable]:
-    owners = list(result.model.layout.owners)
+    owners = list(result.model.coordinate_layout.owners)
     q_units = [unit for h in owners for unit in h.q_units]
     u_units = [unit for h in owners for unit in h.u_units]
     by_speed, efforts = ("time", "speed"), [effort_unit(unit) for unit in u_units]
     rates = [rate_unit(unit) for unit in u_units]
-    effort = result._observed.part("efforts")
+    effort = result._observations.part("efforts")
     return {
         "q": (
             ("time", "coordinate"),
@@ -134,10 +134,10 @@ def _state_variables(result: Record) -> dict[str, Variable]:
 
 
 def _body_variables(result: Record) -> dict[str, Variable]:
-    names = result._observed.references
+    names = result._observations.references
     result_variables: dict[str, Variable] = {}
     for kind, description in BODY_QUANTITIES.items():
-        columns = [result._quantities.of_body(name, kind) for name in names]
+        columns = [result._quantities.body_quantity(name, kind) for name in names]
         values = np.stack(columns, axis=1) if columns else np.zeros((len(result.t), 0, 3))
         last = "component" if kind == "orientation" else "axis"
         result_variables[kind] = (
@@ -156,10 +156,10 @@ def _body_variables(result: Record) -> dict[str, Variable]:
 
 
 def _hinge_variables(result: Record) -> dict[str, Variable]:
-    names = list(result.model.layout.hinges)
+    names = list(result.model.coordinate_layout.hinges)
     result_variables: dict[str, Variable] = {}
     for kind, description in HINGE_QUANTITIES.items():
-        columns = [result._quantities.of_hinge(name, kind) for name in names]
+        columns = [result._quantities.hinge_quantity(name, kind) for name in names]
         values = np.stack(columns, axis=1) if columns else np.zeros((len(result.t), 0, 3))
         long_name = f"{description.long_name}, inertial axes"
         result_variables[kind] = (
@@ -191,7 +191,7 @@ def _element_variables(result: Record) -> dict[str, Variable]:
     """
     owners_by_word: dict[str, list[str]] = {}
     quantities_by_kind: dict[tuple[str, str], dict[str, Quantity]] = {}
-    for quantity in result._quantities.acting_wholes():
+    for quantity in result._quantities.load_vectors():
         word, _, owner = quantity.owner.partition(" ")
         if owner not in owners_by_word.setdefault(word, []):
             owners_by_word[word].append(owner)
@@ -210,7 +210,9 @@ def _element_variables(result: Record) -> dict[str, Variable]:
             for name in owners_by_word[word]
         ]
         dims = ("time", word, *(_DIMENSIONS[first.labels] if first.labels else ()))
-        description = _attributes(_common_unit([x.unit for x in quantities.values()]), first.what)
+        description = _attributes(
+            _common_unit([x.unit for x in quantities.values()]), first.description
+        )
         result_variables[f"{word}_{kind}"] = (dims, np.stack(columns, axis=1), description)
     return result_variables
 

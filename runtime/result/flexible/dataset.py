@@ -27,7 +27,7 @@ _MAX_WRITTEN_BODIES = 40
 
 def labels(result: Record) -> dict[str, tuple[str, list[str], str]]:
     """Map from name to (dimension, labels, long name)."""
-    bodies = result.model.flexible
+    bodies = result.model.flexible_bodies
     if not bodies:
         return {}
     modes = [f"{name}.{mode}" for name, body in bodies.items() for mode in body.modes]
@@ -39,14 +39,14 @@ def labels(result: Record) -> dict[str, tuple[str, list[str], str]]:
 
 def variables(result: Record) -> dict[str, Variable]:
     """Modal energies, equivalent motions of flexible bodies, and shape functions of beams."""
-    bodies = result.model.flexible
+    bodies = result.model.flexible_bodies
     if not bodies:
         return {}
     dataset_variables: dict[str, Variable] = {
         "modal_energy": (
             ("time", "mode"),
             np.concatenate([result.modal_energy(name) for name in bodies], axis=1),
-            _attributes("J", "strain energy of modes and kinetic energy against the frame"),
+            _attributes("J", "strain energy of modes and kinetic energy relative to the frame"),
         ),
         "strain_energy": (
             ("time", "flexible"),
@@ -69,13 +69,13 @@ def _shape_variables(name: str, body: ModalBody) -> dict[str, Variable]:
     shapes = body.shapes
     assert shapes is not None
     x = np.linspace(0.0, shapes.length, STATION_COUNT)
-    values, station, modes = shapes.at(x), f"{name}_x", f"{name}_mode"
+    values, station, modes = shapes.values_at(x), f"{name}_x", f"{name}_mode"
     second_order = np.zeros((len(x), 3, body.n, body.n))
     if shapes.stiffening:
-        second_order = shapes.second_order.at(x)[:, :3]
+        second_order = shapes.second_order.field_at(x)[:, :3]
     words = np.array(body.modes, dtype=object)
     return {
-        station: ((station,), x, _attributes("m", f"place along {name}")),
+        station: ((station,), x, _attributes("m", f"position along {name}")),
         modes: ((modes,), words, {"long_name": f"mode of {name}"}),
         f"{name}_phi": (
             (station, "axis", modes),

@@ -22,10 +22,10 @@ _XYZ = ("x", "y", "z")
 
 #: For every body: unit, long name, columns, and the method of `Result` that returns it.
 BODY_QUANTITIES = {
-    "momentum": (QuantityKind("kg*m/s", "linear momentum", _XYZ, ()), "momentum_of"),
+    "momentum": (QuantityKind("kg*m/s", "linear momentum", _XYZ, ()), "body_momentum"),
     "angular_momentum": (
         QuantityKind("kg*m2/s", "angular momentum about the mass centre", _XYZ, ()),
-        "angular_momentum_of",
+        "body_angular_momentum",
     ),
     "center_of_mass": (
         QuantityKind("m", "position of the mass centre", _XYZ, ()),
@@ -37,19 +37,20 @@ BODY_QUANTITIES = {
     ),
     "equivalent_spin": (
         QuantityKind("rad/s", "spin of a rigid body of the same angular momentum", _XYZ, ()),
-        "equivalent_spin",
+        "equivalent_angular_velocity",
     ),
 }
 
 #: At the ends of beams, in frame or section axes.
 END_QUANTITIES = {
     "deflection": (QuantityKind("m", "elastic displacement, frame axes", _XYZ, ()), "deflection"),
-    "slope": (QuantityKind("", "slope against the frame along", ("y", "z"), ()), "slope"),
+    "slope": (QuantityKind("", "slope relative to the frame along", ("y", "z"), ()), "slope"),
     "section_force": (
-        QuantityKind("N", "force of the part beyond, section axes", _XYZ, ()), "section_force",
+        QuantityKind("N", "force of the outboard part, section axes", _XYZ, ()), "section_force",
     ),
     "section_moment": (
-        QuantityKind("N*m", "moment of the part beyond, section axes", _XYZ, ()), "section_moment",
+        QuantityKind("N*m", "moment of the outboard part, section axes", _XYZ, ()),
+        "section_moment",
     ),
 }  # fmt: skip
 
@@ -61,7 +62,7 @@ LISTED_END_QUANTITIES = ("deflection",)
 def add_body_quantities(table: Table, results: FlexibleResults, reference: str) -> None:
     """Add the names of a body or an end after those common to all."""
     body, end = split_reference(reference)
-    flexible = results.model.flexible.get(body)
+    flexible = results.model.flexible_bodies.get(body)
     if end:
         if flexible is not None and flexible.shapes is not None:
             _add_end_quantities(table, results, body, end)

@@ -14,7 +14,7 @@ import numpy as np
 
 from mstmm.array_validation import Array
 
-from ...flexible.beam.gauss_quadrature import gauss_between
+from ...flexible.beam.gauss_quadrature import gauss_points
 from ...flexible.beam.section_ports import BeamShapes
 from ...flexible.modal_body import ModalBody
 from .range_estimators import has_bending_shapes
@@ -28,7 +28,7 @@ _MIN_LENGTH_RATIO = 0.01
 def quadrature_rule(shapes: BeamShapes, held: float) -> tuple[Array, Array]:
     """Points and weights (m) along a beam fixed at x = `held`, for its shapes and phi."""
     waves = _QUARTER_WAVES / 2 / min(map(abs, _distances_to_ends(shapes.length, held)))
-    return gauss_between(
+    return gauss_points(
         np.union1d(shapes.pieces, [held]), lambda a, b: max(shapes.density(a, b), waves)
     )
 
@@ -39,13 +39,7 @@ def _distances_to_ends(length: float, held: float) -> list[float]:
 
 
 def lateral_load_ratio(
-    body: ModalBody,
-    x: Array,
-    weights: Array,
-    held: float,
-    line: float,
-    force: Array,
-    moment: Array,
+    body: ModalBody, x: Array, weights: Array, held: float, line: float, force: Array, moment: Array
 ) -> float | None:
     """Largest ratio of load to buckling load in directions without shape functions.
 

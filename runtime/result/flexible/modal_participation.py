@@ -39,7 +39,7 @@ def participation_by_body(flexible: FlexibleBodies) -> dict[str, Array]:
     try:
         return (
             _loop_participation(flexible, model, q)
-            if model.freedom
+            if model.independent_speeds
             else _tree_participation(flexible, model, q)
         )
     except NumericalFailure:
@@ -50,8 +50,8 @@ def _tree_participation(
     flexible: FlexibleBodies, model: CompiledScene, q: Array
 ) -> dict[str, Array]:
     inertia, tree, result = model.looped.mass_matrix(q), _Tree(model), dict[str, Array]()
-    for name in flexible.known:
-        hinge_speeds, outboard_speeds = tree.hinge_of(name)
+    for name in flexible.modal_bodies:
+        hinge_speeds, outboard_speeds = tree.moving_hinge(name)
         if hinge_speeds:
             result |= _participation_row(
                 name, inertia, hinge_speeds, _modal_speed_indices(model, name), outboard_speeds
@@ -63,18 +63,18 @@ def _loop_participation(
     flexible: FlexibleBodies, model: CompiledScene, q: Array
 ) -> dict[str, Array]:
     """Participation by independent motions of loops, which must include every shape function."""
-    assert model.freedom is not None
+    assert model.independent_speeds is not None
     result, shapes = (
         dict[str, Array](),
-        {name: _modal_speed_indices(model, name) for name in flexible.known},
+        {name: _modal_speed_indices(model, name) for name in flexible.modal_bodies},
     )
     modal_speeds = [k for modes in shapes.values() for k in modes]
-    hinges, free_speeds = model.freedom.settling(q, modal_speeds, (), ())
+    hinges, free_speeds = model.independent_speeds.select_fixed_speeds(q, modal_speeds, (), ())
     if not hinges or {*free_speeds} != {*modal_speeds}:
         return {}
     speed_indices, hinge_indices = (*hinges, *modal_speeds), list(range(len(hinges)))
-    motions = model.freedom.following(q, speed_indices)
-    inertia = np.asarray(model.looped.required_by_inertia(q, motions.T) @ motions)
+    motions = model.independent_speeds.motion_matrix(q, speed_indices)
+    inertia = np.asarray(model.looped.mass_matrix_product(q, motions.T) @ motions)
     for name, modes in shapes.items():
         result |= _participation_row(
             name, inertia, hinge_indices, [speed_indices.index(k) for k in modes], []
@@ -83,33 +83,33 @@ def _loop_participation(
 
 
 def _participation_row(
-    name: str, inertia: Array, own: list[int], modes: list[int], others: list[int]
+    name: str, inertia: Array, own: list[int], modes: list[int], other_modes: list[int]
 ) -> dict[str, Array]:
     """Participation of one body; empty (unknown) where a hinge has no inertia."""
     try:
-        return {name: _participation_of_modes(inertia, own, modes, others)}
+        return {name: _participation_of_modes(inertia, own, modes, other_modes)}
     except np.linalg.LinAlgError:
         return {}
 
 
 def _modal_speed_indices(model: CompiledScene, name: str) -> list[int]:
-    return list(range(*_bounds(model.layout.modal[name].u_slice)))
+    return list(range(*_bounds(model.coordinate_layout.modal[name].u_slice)))
 
 
 def _participation_of_modes(
-    inertia: Array, own: list[int], modes: list[int], others: list[int]
+    inertia: Array, own: list[int], modes: list[int], other_modes: list[int]
 ) -> Array:
     """Participation chi of modes from the mass matrix.
 
-    `own`, `modes` and `others` are speed indices of the hinge, the modes and the outboard hinges.
+    `own`, `modes` and `other_modes` are speed indices of hinge, modes and outboard hinges.
     """
     indices, hinge_count = [*own, *modes], len(own)
     block = inertia[np.ix_(indices, indices)]
-    if others:
+    if other_modes:
         coupling_gain = np.linalg.solve(
-            inertia[np.ix_(others, others)], inertia[np.ix_(others, indices)]
+            inertia[np.ix_(other_modes, other_modes)], inertia[np.ix_(other_modes, indices)]
         )
-        block = block - inertia[np.ix_(indices, others)] @ coupling_gain
+        block = block - inertia[np.ix_(indices, other_modes)] @ coupling_gain
     return participation(
         block[:hinge_count, hinge_count:],
         block[:hinge_count, :hinge_count],
@@ -117,8 +117,8 @@ def _participation_of_modes(
     )
 
 
-def _bounds(places: slice) -> tuple[int, int]:
-    return int(places.start), int(places.stop)
+def _bounds(indices: slice) -> tuple[int, int]:
+    return int(indices.start), int(indices.stop)
 
 
 def participation(rows: Array, hinge: Array, modal: Array) -> Array:
@@ -135,7 +135,7 @@ class _Tree:
     """Free speeds of the hinges, and the inboard body of each body."""
 
     def __init__(self, model: CompiledScene) -> None:
-        layout, scene = model.layout, model.scene
+        layout, scene = model.coordinate_layout, model.scene
         self.speeds: dict[str, list[int]] = {}
         self.inboard: dict[str, str] = {}
         for hinge in scene.hinges:
@@ -147,7 +147,7 @@ class _Tree:
                 first + k for k in range(last - first) if k >= len(drive) or drive[k] is None
             ]
 
-    def hinge_of(self, body: str) -> tuple[list[int], list[int]]:
+    def moving_hinge(self, body: str) -> tuple[list[int], list[int]]:
         """Speeds of the nearest moving hinge inboard of a body, and of all outboard of it."""
         while body in self.inboard and not self.speeds[body]:
             body = self.inboard[body]

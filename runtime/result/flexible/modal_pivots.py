@@ -31,13 +31,13 @@ class ModalPivots:
         self._subspace = lib.MSTMM_SECTION_H_PER_MODE
         self.frames: dict[int, tuple[int, int, int | None]] = {}
         modal, sections = packed.written.modal, packed.written.sections
-        for i, place in modal.items():
+        for i, index in modal.items():
             body = packed.system.body(i)
             assert body.modal is not None
-            self.frames[i] = (body.modal.n, place, sections.get(i))
-        self.sections = {i: place for i, place in sections.items() if i not in modal}
+            self.frames[i] = (body.modal.n, index, sections.get(i))
+        self.sections = {i: index for i, index in sections.items() if i not in modal}
 
-    def through(
+    def add_modal_response(
         self, numbers: Array, S: Array, carried: Array, parents: NDArray[np.int64], E: Array
     ) -> None:
         """Add the modal response to the transferred motions and the rounding, in place.
@@ -45,7 +45,7 @@ class ModalPivots:
         `carried` (m, 6, 6) is the motion of each body from that of its parent, `E` (m, 6, 6) the
         rounding of each flexible body, and `S` (m, 6, 6) are the inertias with condensed modes.
         """
-        gains = {i: self._answer(numbers, i) for i in self.frames}
+        gains = {i: self._gain_and_motion(numbers, i) for i in self.frames}
         for i, parent in enumerate(parents.tolist()):
             if parent in gains:
                 gain, frame_motion = gains[parent]
@@ -66,7 +66,7 @@ class ModalPivots:
                 modal_rounding[:, None] * gain
             )
 
-    def _answer(self, numbers: Array, i: int) -> tuple[Array, Array]:
+    def _gain_and_motion(self, numbers: Array, i: int) -> tuple[Array, Array]:
         """Gain G (n, 6), and the motion (6, 6) of the frame itself."""
         n, offset, section_offset = self.frames[i]
         first = offset + self._gain * n

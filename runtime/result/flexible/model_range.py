@@ -112,7 +112,7 @@ class ModelRange:
 
 def model_ranges(flexible: FlexibleBodies) -> tuple[ModelRange, ...]:
     """Ranges, one per flexible body; empty for runs without samples and for too many bodies."""
-    if not len(flexible.run.t) or not 0 < len(flexible.known) <= MAX_BODIES:
+    if not len(flexible.run.t) or not 0 < len(flexible.modal_bodies) <= MAX_BODIES:
         return ()
     shares = participation_by_body(flexible)
     welded_lines = beam_lines(flexible.model.scene)
@@ -123,7 +123,7 @@ def model_ranges(flexible: FlexibleBodies) -> tuple[ModelRange, ...]:
             shares.get(name),
             welded_lines[name].length if name in welded_lines else None,
         )
-        for name in flexible.known
+        for name in flexible.modal_bodies
     )
 
 
@@ -226,11 +226,7 @@ def _load_ratio_bounds(
 
 
 def _section_estimates(
-    flexible: FlexibleBodies,
-    name: str,
-    some: NDArray[np.int64],
-    line: float | None,
-    slope: float,
+    flexible: FlexibleBodies, name: str, some: NDArray[np.int64], line: float | None, slope: float
 ) -> tuple[float | None, float | None, UnshapedDeformation | None]:
     """Estimates from the true section loads of a beam.
 
@@ -238,7 +234,7 @@ def _section_estimates(
     directions without shape functions.
     """
     motion = flexible.motion(name).some(some)
-    inboard_x = flexible.held_place(name)
+    inboard_x = flexible.inboard_position(name)
     x, weights = quadrature_rule(motion.shapes, inboard_x)
     points = [p.some(some) for p in flexible.point_loads(name)]
     lines = [line.some(some) for line in flexible.line_loads(name)]
@@ -252,7 +248,7 @@ def _section_estimates(
 
 
 def missed_bending_energy(
-    motion: Motion, places: Array, weights: Array, moment: Array
+    motion: Motion, positions: Array, weights: Array, moment: Array
 ) -> float | None:
     """Part of the bending energy of `moment` (n, m, 2) that the shape functions miss.
 
@@ -260,13 +256,13 @@ def missed_bending_energy(
     followed. None without bending.
     """
     shapes = motion.shapes
-    sections = shapes.sections(places)
+    sections = shapes.sections(positions)
     compliance = weights[:, None] / np.stack([sections.EI_y, sections.EI_z], axis=1)
     bends = np.array(
         [e.has_bending_shapes(motion.body, "z"), e.has_bending_shapes(motion.body, "y")]
     )
     compliance = np.where(bends, compliance, 0.0)
-    shape_moment = elastic_moment(motion, places)
+    shape_moment = elastic_moment(motion, positions)
     true_energy, shape_energy, missed_energy = (
         np.einsum("tma,ma->t", m**2, compliance)
         for m in (moment, shape_moment, moment - shape_moment)
@@ -282,21 +278,21 @@ def missed_deflection(flexible: FlexibleBodies, name: str, some: NDArray[np.int6
     where these are strained most; None without any.
     """
     motion = flexible.motion(name).some(some)
-    truncation, inboard_end = motion.body.truncation, flexible.held_end(name)
+    truncation, inboard_end = motion.body.truncation, flexible.inboard_end(name)
     energies = strain_energy(motion)
     if truncation is None or not len(some) or not energies.max() > 0:
         return None
-    loads = flexible.end_loads(name) | {inboard_end: flexible.held_load(name)}
+    loads = flexible.end_loads(name) | {inboard_end: flexible.inboard_load(name)}
     zero = np.zeros((len(some), 3))
     inputs = []
     for port in truncation.ports:
         force, moment = (part[some] for part in loads[port]) if port in loads else (zero, zero)
         inputs += [motion.inward(force), motion.inward(moment)]
-    spin = tilde(motion.frame_spin)
-    frame_rotation_rate = tilde(motion.frame_spin_rate) + spin @ spin
+    spin = tilde(motion.frame_angular_velocity)
+    frame_rotation_rate = tilde(motion.frame_angular_acceleration) + spin @ spin
     inputs += [-np.swapaxes(frame_rotation_rate, 1, 2).reshape(-1, 9), motion.etadd]
     length = radius_of_gyration(motion.body)
-    missed = truncation.missed(np.concatenate(inputs, axis=1), length)
+    missed = truncation.missed_share(np.concatenate(inputs, axis=1), length)
     return float(missed[int(np.argmax(energies))])
 
 
@@ -306,14 +302,14 @@ def missed_deflection(flexible: FlexibleBodies, name: str, some: NDArray[np.int6
 _MAX_BODY_ROWS = 4
 
 
-def rows(found: Sequence[ModelRange]) -> list[tuple[str, str]]:
+def rows(ranges: Sequence[ModelRange]) -> list[tuple[str, str]]:
     """Rows of the certificate, (name, text)."""
-    if len(found) <= _MAX_BODY_ROWS:
-        return [row for body_range in found for row in _body_rows(body_range)]
-    steepest = max(found, key=lambda body_range: body_range.slope)
-    fastest = max(found, key=lambda body_range: body_range.spin_ratio)
-    loaded = max(found, key=lambda body_range: body_range.load_ratio)
-    strains = [body_range for body_range in found if body_range.strain is not None]
+    if len(ranges) <= _MAX_BODY_ROWS:
+        return [row for body_range in ranges for row in _body_rows(body_range)]
+    steepest = max(ranges, key=lambda body_range: body_range.slope)
+    fastest = max(ranges, key=lambda body_range: body_range.spin_ratio)
+    loaded = max(ranges, key=lambda body_range: body_range.load_ratio)
+    strains = [body_range for body_range in ranges if body_range.strain is not None]
     parts = [
         ("largest slope", f'{steepest.slope:.2g} at "{steepest.name}"'),
         ("largest spin ratio", f'{fastest.spin_ratio:.2g} at "{fastest.name}"'),
@@ -322,39 +318,48 @@ def rows(found: Sequence[ModelRange]) -> list[tuple[str, str]]:
     if strains:
         worst = max(strains, key=lambda body_range: body_range.strain or 0.0)
         parts.append(("largest strain", f'{worst.strain:.1e} at "{worst.name}"'))
-    tails = [body_range for body_range in found if body_range.tail is not None]
+    tails = [body_range for body_range in ranges if body_range.tail is not None]
     if tails:
         worst = max(tails, key=lambda body_range: body_range.tail or 0.0)
-        parts.append(("bending missed", f'{worst.tail:.1e} at "{worst.name}"'))
+        parts.append(("missed bending", f'{worst.tail:.1e} at "{worst.name}"'))
     return parts
 
 
-def _body_rows(one: ModelRange) -> list[tuple[str, str]]:
+def _body_rows(body_range: ModelRange) -> list[tuple[str, str]]:
     motion_parts = [
-        f"slope {one.slope:.2g} (the frame errs by up to {one.frame_error:.0e} of the deflection, "
-        f"{one.shortening_error:.0e} of the shortening)"
+        f"slope {body_range.slope:.2g} (frame error up to {body_range.frame_error:.0e} of the "
+        "deflection, "
+        f"{body_range.shortening_error:.0e} of the foreshortening)"
     ]
-    if one.strain is not None:
-        motion_parts.append(f"strain {one.strain:.1e}")
-    motion_parts.append(f"spin {one.spin_ratio:.2g} of omega_1 = {one.first_frequency:.4g} rad/s")
-    if one.gamma is not None:
-        low, high = one.gamma
+    if body_range.strain is not None:
+        motion_parts.append(f"strain {body_range.strain:.1e}")
+    motion_parts.append(
+        f"spin {body_range.spin_ratio:.2g} of omega_1 = {body_range.first_frequency:.4g} rad/s"
+    )
+    if body_range.gamma is not None:
+        low, high = body_range.gamma
         worst = high if high >= -low else low
         change = "stiffened" if worst >= 0 else "softened"
-        change = f"not {change}" if one.one_way else change
+        change = f"not {change}" if body_range.one_way else change
         motion_parts.append(f"{change} by loads {abs(worst):.2g} (gamma)")
-    shape_parts = [f"{one.modes} in a {one.frame} frame" if one.frame else f"{one.modes}"]
-    if one.unmoved_frame:
-        shape_parts[0] += f" ({one.unmoved_frame} with fewer shapes)"
-    if one.last_share is not None and one.last_share[1]:
-        shape_parts.append(f"{one.last_share[1]} holds {one.last_share[0]:.1e} of the energy")
-    if one.tail is not None:
-        shape_parts.append(f"{one.tail:.1e} of the {one.tail_of} missed")
-    if one.coupling is not None:
-        shape_parts.append(f"coupling {one.coupling[0]:.2g} ({one.coupling[1]})")
-    if one.shear is not None:
-        shape_parts.append(f"shear {one.shear:.0e}")
+    shape_parts = [
+        f"{body_range.modes} in a {body_range.frame} frame"
+        if body_range.frame
+        else f"{body_range.modes}"
+    ]
+    if body_range.unmoved_frame:
+        shape_parts[0] += f" ({body_range.unmoved_frame} with fewer shapes)"
+    if body_range.last_share is not None and body_range.last_share[1]:
+        shape_parts.append(
+            f"{body_range.last_share[1]} holds {body_range.last_share[0]:.1e} of the energy"
+        )
+    if body_range.tail is not None:
+        shape_parts.append(f"{body_range.tail:.1e} of the {body_range.tail_of} missed")
+    if body_range.coupling is not None:
+        shape_parts.append(f"coupling {body_range.coupling[0]:.2g} ({body_range.coupling[1]})")
+    if body_range.shear is not None:
+        shape_parts.append(f"shear {body_range.shear:.0e}")
     return [
-        (f"{one.name}", "; ".join(motion_parts)),
-        (f"{one.name} shapes", "; ".join(shape_parts)),
+        (f"{body_range.name}", "; ".join(motion_parts)),
+        (f"{body_range.name} shapes", "; ".join(shape_parts)),
     ]

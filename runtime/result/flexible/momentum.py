@@ -45,31 +45,35 @@ class Momentum:
     angular: Array
     center: Array
     velocity: Array
-    spin: Array
+    angular_velocity: Array
 
 
 class Momenta:
     """Momenta of bodies, computed on first use."""
 
     def __init__(self, flexible: FlexibleBodies) -> None:
-        self.flexible, self.observed = flexible, flexible.observed
-        self._known: dict[str, Momentum] = {}
+        self.flexible, self.observations = flexible, flexible.observations
+        self._momentum_by_name: dict[str, Momentum] = {}
 
-    def of(self, name: str) -> Momentum:
+    def body_momentum(self, name: str) -> Momentum:
         """Momentum of one body; SceneError for an unknown body, and for one without mass."""
-        references = self.observed.references
+        references = self.observations.references
         canonical_name = references.canonical(name)
         if canonical_name is None or references.bodies.find(canonical_name) is None:
-            raise SceneError(self.observed.references.unknown(name))
-        if canonical_name not in self._known:
-            compute = self._of_flexible if canonical_name in self.flexible.known else self._of_rigid
-            self._known[canonical_name] = compute(canonical_name)
-        return self._known[canonical_name]
+            raise SceneError(self.observations.references.unknown(name))
+        if canonical_name not in self._momentum_by_name:
+            compute = (
+                self._flexible_momentum
+                if canonical_name in self.flexible.modal_bodies
+                else self._rigid_momentum
+            )
+            self._momentum_by_name[canonical_name] = compute(canonical_name)
+        return self._momentum_by_name[canonical_name]
 
-    def _of_rigid(self, name: str) -> Momentum:
+    def _rigid_momentum(self, name: str) -> Momentum:
         """Momentum of a rigid body from its inertia matrix and its own motion."""
         mass, center, inertia = self._inertia(name)
-        points = self.observed.node(name)
+        points = self.observations.node(name)
         rotation = points[:, 15:24].reshape(-1, 3, 3)
         spin, arm = points[:, 9:12], rotation @ center
         velocity = points[:, 3:6] + np.cross(spin, arm)
@@ -81,7 +85,7 @@ class Momenta:
 
         Evaluated by the kernel from which the engine obtains them.
         """
-        packed = self.observed.apart.engine.packed
+        packed = self.observations.unmerged.engine.packed
         body_index, axes, offset = packed.end(name)
         body, ffi, numbers = packed.system.body(body_index), packed.ffi, np.zeros(21)
         kernel_pointer = packed.elements[body.body].functions["inertia"]
@@ -95,18 +99,18 @@ class Momenta:
             raise SceneError(f'"{name}": a body without mass has no equivalent velocity')
         return mass, *shift_inertia(matrix, np.array(axes).reshape(3, 3), np.array(offset))
 
-    def _of_flexible(self, name: str) -> Momentum:
+    def _flexible_momentum(self, name: str) -> Momentum:
         motion = self.flexible.motion(name)
         if motion.body.points:
-            return self._of_points(motion)
+            return self._point_momentum(motion)
         linear, about_origin, first = frame_momentum(motion)
         return equivalent_momentum(motion, linear, about_origin, first / motion.body.mass)
 
-    def _of_points(self, motion: Motion) -> Momentum:
+    def _point_momentum(self, motion: Motion) -> Momentum:
         """Momentum of a body with mass points, summed over the points."""
         name, parts = motion.body.name, []
         for k in range(len(motion.body.points)):
-            parts.append(self._of_rigid(f"{name}/point {k + 1}"))
+            parts.append(self._rigid_momentum(f"{name}/point {k + 1}"))
         linear = np.sum([part.linear for part in parts], axis=0)
         angular = np.sum([part.angular for part in parts], axis=0)
         first = np.zeros_like(linear)
@@ -184,7 +188,7 @@ def frame_momentum(motion: Motion) -> tuple[Array, Array, Array]:
         samples = slice(first, first + rows)
         inputs = {
             **moment_inputs(body), "eta": motion.eta[samples], "etad": motion.etad[samples],
-            "v": motion.frame_velocity[samples], "w": motion.frame_spin[samples],
+            "v": motion.frame_velocity[samples], "w": motion.frame_angular_velocity[samples],
         }  # fmt: skip
         outputs = evaluate(kernel("momentum"), inputs, body.n)
         parts.append(np.concatenate([outputs["h"], outputs["S"]], axis=1))

@@ -38,8 +38,8 @@ class Motion:
         eta, etad, etadd: (n, modes) modal coordinates, speeds and accelerations.
         position: (n, 3) m, origin of the floating frame, inertial axes.
         rotation: (n, 3, 3), frame axes to inertial axes.
-        velocity, spin: (n, 3) m/s and rad/s, of the frame, inertial axes.
-        acceleration, spin_rate: (n, 3) m/s2 and rad/s2, of the frame, inertial axes.
+        velocity, angular_velocity: (n, 3) m/s and rad/s, of the frame, inertial axes.
+        acceleration, angular_acceleration: (n, 3) m/s2 and rad/s2, of the frame, inertial axes.
     """
 
     body: ModalBody
@@ -50,9 +50,9 @@ class Motion:
     position: Array
     rotation: Array
     velocity: Array
-    spin: Array
+    angular_velocity: Array
     acceleration: Array
-    spin_rate: Array
+    angular_acceleration: Array
 
     def some(self, samples: Any) -> Motion:
         """Motion at some of the samples: a slice or indices."""
@@ -63,7 +63,7 @@ class Motion:
     @property
     def shapes(self) -> BeamShapes:
         """Shape functions along the axis of a beam; SceneError for a body without any."""
-        return shapes_of(self.body, "what is along its axis")
+        return shapes_of(self.body, "a quantity along its axis")
 
     # --- floating frame in its own axes ---------------------------------------------------------
 
@@ -81,9 +81,9 @@ class Motion:
         return self.inward(self.velocity)
 
     @cached_property
-    def frame_spin(self) -> Array:
+    def frame_angular_velocity(self) -> Array:
         """Angular velocity (n, 3) in rad/s of the frame, frame axes."""
-        return self.inward(self.spin)
+        return self.inward(self.angular_velocity)
 
     @cached_property
     def frame_acceleration(self) -> Array:
@@ -91,14 +91,14 @@ class Motion:
         return self.inward(self.acceleration)
 
     @cached_property
-    def frame_spin_rate(self) -> Array:
+    def frame_angular_acceleration(self) -> Array:
         """Angular acceleration (n, 3) in rad/s2 of the frame, frame axes."""
-        return self.inward(self.spin_rate)
+        return self.inward(self.angular_acceleration)
 
 
 _ARRAYS = (
-    "t", "eta", "etad", "etadd", "position", "rotation", "velocity", "spin", "acceleration",
-    "spin_rate",
+    "t", "eta", "etad", "etadd", "position", "rotation", "velocity", "angular_velocity",
+    "acceleration", "angular_acceleration",
 )  # fmt: skip
 
 
@@ -109,8 +109,8 @@ def shapes_of(body: ModalBody, what: str) -> BeamShapes:
     """Shape functions of a beam along its axis; SceneError for a body without an axis."""
     if body.shapes is None:
         raise SceneError(
-            f'"{body.name}": {what} is known along beams; this body is elastic by its matrices: '
-            "ask for the position of its ends and for modal_energy instead"
+            f'"{body.name}": {what} exists along beams only; for this elastic body use '
+            "the position of its ends and modal_energy"
         )
     return body.shapes
 
@@ -118,25 +118,25 @@ def shapes_of(body: ModalBody, what: str) -> BeamShapes:
 def checked_stations(body: ModalBody, x: ArrayLike, what: str) -> Array:
     """Positions x in m as (m,); SceneError for a position off the beam or not a number."""
     length = float(shapes_of(body, what).length)
-    places = np.atleast_1d(finite_array(f'{what} of "{body.name}": x', x))
-    if places.ndim != 1:
-        raise SceneError(f"{what}: x has shape {places.shape}, expected one number or (m,)")
+    positions = np.atleast_1d(finite_array(f'{what} of "{body.name}": x', x))
+    if positions.ndim != 1:
+        raise SceneError(f"{what}: x has shape {positions.shape}, expected one number or (m,)")
     is_off_beam = ~(
-        (places >= -_LENGTH_TOLERANCE * length) & (places <= length * (1 + _LENGTH_TOLERANCE))
+        (positions >= -_LENGTH_TOLERANCE * length) & (positions <= length * (1 + _LENGTH_TOLERANCE))
     )
     if is_off_beam.any():
         raise SceneError(
-            f'{what} of "{body.name}": x = {places[is_off_beam][0]:g} m lies off the beam; '
+            f'{what} of "{body.name}": x = {positions[is_off_beam][0]:g} m is not on the beam; '
             f"expected 0 to {length:g} m"
         )
-    return np.asarray(np.clip(places, 0.0, length))
+    return np.asarray(np.clip(positions, 0.0, length))
 
 
-def values_at(shapes: BeamShapes, places: Array) -> ShapeValues:
+def values_at(shapes: BeamShapes, positions: Array) -> ShapeValues:
     """Values of the shape functions at x (m,), cached unless there are too many."""
-    if len(places) * shapes.n > _MAX_CACHED_VALUES:
-        return shapes.at(places)
-    return _cached_values(shapes, np.ascontiguousarray(places, dtype=np.float64).tobytes())
+    if len(positions) * shapes.n > _MAX_CACHED_VALUES:
+        return shapes.values_at(positions)
+    return _cached_values(shapes, np.ascontiguousarray(positions, dtype=np.float64).tobytes())
 
 
 #: Largest number of cached shape function values at sections.
@@ -144,23 +144,23 @@ _MAX_CACHED_VALUES = 2**17
 
 
 @lru_cache(maxsize=16)
-def _cached_values(shapes: BeamShapes, places: bytes) -> ShapeValues:
-    return shapes.at(np.frombuffer(places))
+def _cached_values(shapes: BeamShapes, positions: bytes) -> ShapeValues:
+    return shapes.values_at(np.frombuffer(positions))
 
 
-def deflection(motion: Motion, places: Array) -> Array:
+def deflection(motion: Motion, positions: Array) -> Array:
     """Elastic displacement (n, m, 3) in m of the axis at x, frame axes, second order included."""
-    first = first_order_field(values_at(motion.shapes, places).phi, motion.eta)
-    return first - 0.5 * second_order_motion(motion, places, "eta", "eta")[..., :3]
+    first = first_order_field(values_at(motion.shapes, positions).phi, motion.eta)
+    return first - 0.5 * second_order_motion(motion, positions, "eta", "eta")[..., :3]
 
 
-def rotation_vectors(motion: Motion, places: Array) -> Array:
+def rotation_vectors(motion: Motion, positions: Array) -> Array:
     """Rotation vectors (n, m, 3) in rad of the sections in the frame, second order included.
 
     To first order twist, -w', v'.
     """
-    first = first_order_field(values_at(motion.shapes, places).theta, motion.eta)
-    return first - 0.5 * second_order_motion(motion, places, "eta", "eta")[..., 3:]
+    first = first_order_field(values_at(motion.shapes, positions).theta, motion.eta)
+    return first - 0.5 * second_order_motion(motion, positions, "eta", "eta")[..., 3:]
 
 
 def first_order_field(field: Array, modal: Array) -> Array:
@@ -170,7 +170,7 @@ def first_order_field(field: Array, modal: Array) -> Array:
 
 
 def second_order_motion(
-    motion: Motion, places: Array, a: str, b: str, carried: bool = False
+    motion: Motion, positions: Array, a: str, b: str, carried: bool = False
 ) -> Array:
     """Second-order displacement and rotation (n, m, 6) at x: a^T g b.
 
@@ -178,28 +178,28 @@ def second_order_motion(
     `SecondOrder`.
     """
     if not motion.shapes.stiffening:
-        return np.zeros((len(motion.t), len(places), 6))
+        return np.zeros((len(motion.t), len(positions), 6))
     field = motion.shapes.second_order
-    return field.of(places, getattr(motion, a), getattr(motion, b), carried)
+    return field.evaluate(positions, getattr(motion, a), getattr(motion, b), carried)
 
 
-def slope(motion: Motion, places: Array) -> Array:
+def slope(motion: Motion, positions: Array) -> Array:
     """Slopes (n, m, 2) of the axis, v' and w', relative to the frame's x axis."""
-    rotation = rotation_vectors(motion, places)
+    rotation = rotation_vectors(motion, positions)
     return np.stack([rotation[:, :, 2], -rotation[:, :, 1]], axis=2)
 
 
-def curvature(motion: Motion, places: Array) -> Array:
+def curvature(motion: Motion, positions: Array) -> Array:
     """Curvature (n, m, 2) in 1/m about y, -w'', and about z, v''."""
-    curvature_of_modes = values_at(motion.shapes, places).curvature[:, 1:]
+    curvature_of_modes = values_at(motion.shapes, positions).curvature[:, 1:]
     return np.einsum("mak,tk->tma", curvature_of_modes, motion.eta)
 
 
-def deflected_axis(motion: Motion, places: Array) -> Array:
+def deflected_axis(motion: Motion, positions: Array) -> Array:
     """Inertial positions (n, m, 3) in m of the deflected axis."""
-    at_rest = np.zeros((len(places), 3))
-    at_rest[:, 0] = places
-    local = at_rest + deflection(motion, places)
+    at_rest = np.zeros((len(positions), 3))
+    at_rest[:, 0] = positions
+    local = at_rest + deflection(motion, positions)
     return motion.position[:, None, :] + motion.outward(local)
 
 
@@ -223,20 +223,20 @@ def tilde(v: Array) -> Array:
     return np.stack(rows, axis=-1).reshape(*v.shape[:-1], 3, 3)
 
 
-def elastic_moment(motion: Motion, places: Array) -> Array:
+def elastic_moment(motion: Motion, positions: Array) -> Array:
     """Bending moments (n, m, 2) in N*m of the curvature of the shapes, about y and about z."""
-    sections = motion.shapes.sections(places)
+    sections = motion.shapes.sections(positions)
     stiffness = np.stack([sections.EI_y, sections.EI_z], axis=1)
-    return curvature(motion, places) * stiffness
+    return curvature(motion, positions) * stiffness
 
 
-def elastic_force(motion: Motion, places: Array) -> Array:
+def elastic_force(motion: Motion, positions: Array) -> Array:
     """Axial force (n, m), EA s' in N, of the axial shapes; SceneError for a beam without them."""
-    values = values_at(motion.shapes, places)
-    if not values.stretch.any():
+    values = values_at(motion.shapes, positions)
+    if not values.axial_strain.any():
         raise SceneError(
             f'axial_force of "{motion.body.name}" from its shapes: it has no axial modes; '
             'use source = "equilibrium"'
         )
-    stretch = np.einsum("mk,tk->tm", values.stretch, motion.eta)
-    return np.asarray(stretch * motion.shapes.sections(places).EA)
+    stretch = np.einsum("mk,tk->tm", values.axial_strain, motion.eta)
+    return np.asarray(stretch * motion.shapes.sections(positions).EA)

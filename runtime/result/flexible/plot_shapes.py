@@ -140,8 +140,8 @@ def draw_strip(
             )
         )  # fmt: skip
         axis.scatter(*(strip.deflected[:, -1] @ basis).T, s=12, c=shade, zorder=4, linewidths=0)
-    for place in ground:
-        axis.plot(*(place @ basis), marker="s", color="#000000", markersize=4.5, zorder=5)
+    for position in ground:
+        axis.plot(*(position @ basis), marker="s", color="#000000", markersize=4.5, zorder=5)
     axis.autoscale_view()
     axis.set_aspect("equal", adjustable="datalim")
     axis.set_xlabel(f"{direction_label(first)} in m")
@@ -161,7 +161,7 @@ def draw_deflections(
     axis.add_collection(LineCollection(curves, colors=colours(norm(times)), linewidths=1.6))
     axis.autoscale_view()
     axis.margins(x=0.01)
-    axis.set_xlabel("place along the beam in m")
+    axis.set_xlabel("position along the beam in m")
     axis.set_ylabel(f"{name} in m")
     _draw_colour_bar(figure, axis, colours, norm)
 

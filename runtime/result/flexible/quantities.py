@@ -38,28 +38,28 @@ class FlexibleResults:
     """
 
     model: CompiledScene
-    _observed: Observations
+    _observations: Observations
 
     @cached_property
     def _flexible(self) -> FlexibleBodies:
-        return FlexibleBodies(self.model, self._observed)
+        return FlexibleBodies(self.model, self._observations)
 
     @cached_property
     def _momenta(self) -> Momenta:
         return Momenta(self._flexible)
 
-    def _along(
+    def _evaluate_along(
         self, body: str, x: ArrayLike | str, what: str, get: Callable[[Motion, Array], Array]
     ) -> Array:
         motion = self._flexible.motion(body, what)
         if isinstance(x, str):
-            x = self._end(motion, x, what)
-        places = observe.checked_stations(motion.body, x, what)
-        values = get(motion, places)
+            x = self._end_position(motion, x, what)
+        positions = observe.checked_stations(motion.body, x, what)
+        values = get(motion, positions)
         return values[:, 0] if np.ndim(x) == 0 else values
 
     @staticmethod
-    def _end(motion: Motion, end: str, what: str) -> float:
+    def _end_position(motion: Motion, end: str, what: str) -> float:
         observe.shapes_of(motion.body, what)
         port = motion.body.ports.get(end)
         if port is None:
@@ -74,18 +74,18 @@ class FlexibleResults:
 
         Includes foreshortening by bending, unless the beam has stiffening = false.
         """
-        return self._along(body, x, "deflection", observe.deflection)
+        return self._evaluate_along(body, x, "deflection", observe.deflection)
 
     def slope(self, body: str, x: ArrayLike | str) -> Array:
         """Slopes (n, 2) of the axis at x relative to the floating frame, v' and w'.
 
         v and w are the deflections along y and z.
         """
-        return self._along(body, x, "slope", observe.slope)
+        return self._evaluate_along(body, x, "slope", observe.slope)
 
     def curvature(self, body: str, x: ArrayLike | str) -> Array:
         """Curvature (n, 2) in 1/m at x about y, -w'', and about z, v''."""
-        return self._along(body, x, "curvature", observe.curvature)
+        return self._evaluate_along(body, x, "curvature", observe.curvature)
 
     def section_force(self, body: str, x: ArrayLike | str) -> Array:
         """Section force (n, 3) in N at x, section axes, from equilibrium.
@@ -93,7 +93,7 @@ class FlexibleResults:
         Force of the part beyond x on the part before it: axial (tension positive), shear along y
         and z.
         """
-        return self._along(body, x, "section_force", lambda m, p: self._loads(m, p)[0])
+        return self._evaluate_along(body, x, "section_force", lambda m, p: self._loads(m, p)[0])
 
     def section_moment(self, body: str, x: ArrayLike | str) -> Array:
         """Section moment (n, 3) in N*m at x, section axes, from equilibrium.
@@ -101,7 +101,7 @@ class FlexibleResults:
         Moment of the part beyond x on the part before it, about the deflected axis: torque, bending
         about y and z.
         """
-        return self._along(body, x, "section_moment", lambda m, p: self._loads(m, p)[1])
+        return self._evaluate_along(body, x, "section_moment", lambda m, p: self._loads(m, p)[1])
 
     def bending_moment(self, body: str, x: ArrayLike | str, source: str = "equilibrium") -> Array:
         """Bending moments (n, 2) in N*m at x about y and z, of the part beyond on the part before.
@@ -111,7 +111,7 @@ class FlexibleResults:
         """
         if _require_source(source) == "equilibrium":
             return self.section_moment(body, x)[..., 1:]
-        return self._along(body, x, "bending_moment", observe.elastic_moment)
+        return self._evaluate_along(body, x, "bending_moment", observe.elastic_moment)
 
     def axial_force(self, body: str, x: ArrayLike | str, source: str = "equilibrium") -> Array:
         """Axial force (n,) in N at x, tension positive.
@@ -121,22 +121,22 @@ class FlexibleResults:
         """
         if _require_source(source) == "equilibrium":
             return self.section_force(body, x)[..., 0]
-        return self._along(body, x, "axial_force", observe.elastic_force)
+        return self._evaluate_along(body, x, "axial_force", observe.elastic_force)
 
-    def _loads(self, motion: Motion, places: Array) -> tuple[Array, Array]:
+    def _loads(self, motion: Motion, positions: Array) -> tuple[Array, Array]:
         flexible, name = self._flexible, motion.body.name
         if name in flexible.unbalanced:
             raise SceneError(
-                f'"{name}": loads of a loop on its ends are those of the rigid run, which do not '
-                "balance its vibration, so that no equilibrium tells loads of its sections; take "
+                f'"{name}": loop loads on its ends are those of the rigid run, which do not '
+                "balance its vibration, so that section loads do not follow from equilibrium; use "
                 'source = "shapes" of bending_moment and axial_force, or model = "flexible"'
             )
         return section_loads(
-            motion, places, flexible.gravity, flexible.held_place(name),
+            motion, positions, flexible.gravity, flexible.inboard_position(name),
             flexible.point_loads(name), flexible.line_loads(name),
         )  # fmt: skip
 
-    def shape(self, body: str, points: int = 41) -> Array:
+    def deflected_shape(self, body: str, points: int = 41) -> Array:
         """Inertial positions (n, points, 3) in m of the deflected axis, evenly spaced."""
         if points < 2:
             raise SceneError(f"shape: points = {points}: expected 2 or more")
@@ -159,29 +159,29 @@ class FlexibleResults:
 
     # --- of any body ----------------------------------------------------------------------------
 
-    def momentum_of(self, body: str) -> Array:
+    def body_momentum(self, body: str) -> Array:
         """Linear momentum (n, 3) in kg*m/s of one body, rigid or flexible."""
-        return self._momenta.of(body).linear
+        return self._momenta.body_momentum(body).linear
 
-    def angular_momentum_of(self, body: str) -> Array:
+    def body_angular_momentum(self, body: str) -> Array:
         """Angular momentum (n, 3) in kg*m2/s of one body about its own mass centre."""
-        return self._momenta.of(body).angular
+        return self._momenta.body_momentum(body).angular
 
     def center_of_mass(self, body: str) -> Array:
         """Position (n, 3) in m of the mass centre of one body in its deformed shape."""
-        return self._momenta.of(body).center
+        return self._momenta.body_momentum(body).center
 
     def equivalent_velocity(self, body: str) -> Array:
         """Velocity (n, 3) in m/s of a rigid body of the same mass and momentum, p/m."""
-        return self._momenta.of(body).velocity
+        return self._momenta.body_momentum(body).velocity
 
-    def equivalent_spin(self, body: str) -> Array:
+    def equivalent_angular_velocity(self, body: str) -> Array:
         """Angular velocity (n, 3) in rad/s of a rigid body of the same angular momentum.
 
         About the mass centre, with the inertia of the undeformed body in the axes of the floating
         frame.
         """
-        return self._momenta.of(body).spin
+        return self._momenta.body_momentum(body).angular_velocity
 
 
 def _require_source(source: str) -> str:

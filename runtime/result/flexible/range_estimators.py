@@ -50,8 +50,8 @@ def _rotation_vectors(motion: Motion) -> list[Array]:
     """Rotation vectors (n, m, 3) of sections along a beam, or of the ends of an elastic body."""
     body = motion.body
     if body.shapes is not None:
-        places = np.linspace(0.0, body.shapes.length, SECTION_COUNT)
-        return [rotation_vectors(motion, places)]
+        positions = np.linspace(0.0, body.shapes.length, SECTION_COUNT)
+        return [rotation_vectors(motion, positions)]
     return [np.einsum("ak,tk->ta", p.theta, motion.eta)[:, None] for p in body.ports.values()]
 
 
@@ -66,7 +66,9 @@ def transverse_spin(motion: Motion) -> float:
     Spin about a beam's own axis neither stretches nor bends it.
     """
     first = 1 if motion.body.shapes is not None else 0
-    return float(np.max(np.linalg.norm(motion.frame_spin[:, first:], axis=1), initial=0.0))
+    return float(
+        np.max(np.linalg.norm(motion.frame_angular_velocity[:, first:], axis=1), initial=0.0)
+    )
 
 
 @dataclass(frozen=True)
@@ -94,7 +96,7 @@ def second_order_moments(body: ModalBody) -> SecondOrder | None:
     x, weights = body.shapes.rule()
     density = body.shapes.data.inertia[:, body.shapes.data.piece(x)]
     end_positions = np.array([port.position[0] for port in body.ports.values()])
-    at_ends = body.shapes.second_order.at(end_positions)
+    at_ends = body.shapes.second_order.field_at(end_positions)
     return SecondOrder(
         *second_moments(body.shapes, density, x, weights),
         dict(zip(body.ports, at_ends, strict=True)),
@@ -112,9 +114,11 @@ def stiffness_from_loads(
     work of transverse loads on its twist. `ports` are forces in N and moments in N*m (n, 3) on the
     ends, inertial axes.
     """
-    force = motion.frame_acceleration - motion.inward(np.broadcast_to(gravity, motion.spin.shape))
-    spin = tilde(motion.frame_spin)
-    frame_rotation_rate = tilde(motion.frame_spin_rate) + spin @ spin
+    force = motion.frame_acceleration - motion.inward(
+        np.broadcast_to(gravity, motion.angular_velocity.shape)
+    )
+    spin = tilde(motion.frame_angular_velocity)
+    frame_rotation_rate = tilde(motion.frame_angular_acceleration) + spin @ spin
     total = -np.tensordot(force, second.G, axes=1)
     total -= np.tensordot(frame_rotation_rate, second.X, axes=((1, 2), (1, 0)))
     for name, loads in ports.items():
@@ -188,9 +192,9 @@ def max_strain(motion: Motion) -> float | None:
         return _max_line_stretch(motion)
     x = np.linspace(0.0, body.shapes.length, SECTION_COUNT)
     values, radii = values_at(body.shapes, x), gyration_radii(body.shapes, x)
-    if not values.stretch.any() and not radii[1:].any():
+    if not values.axial_strain.any() and not radii[1:].any():
         return None
-    strain = np.abs(np.einsum("mk,tk->tm", values.stretch, motion.eta))
+    strain = np.abs(np.einsum("mk,tk->tm", values.axial_strain, motion.eta))
     for row in (1, 2):
         curvature = np.einsum("mk,tk->tm", values.curvature[:, row], motion.eta)
         strain += np.sqrt(3.0) * radii[row] * np.abs(curvature)

@@ -27,15 +27,15 @@ if TYPE_CHECKING:
 ) = 0.3, 0.1, 1.0, 0.1, 0.05, 1.4, -0.9, 0.05
 
 
-def flexibility_risks(found: Sequence[ModelRange]) -> list[Risk]:
+def flexibility_risks(ranges: Sequence[ModelRange]) -> list[Risk]:
     """Objections to flexible models, one finding per kind, for the worst body."""
     rows = []
-    for body_range in found:
+    for body_range in ranges:
         for text in body_range.said:
             means, _, remedy = text.partition("; ")
             rows.append(Risk("body-model", f'"{body_range.name}"', means, remedy))
     worst_first = sorted(
-        found,
+        ranges,
         key=lambda body_range: -max(body_range.slope, body_range.spin_ratio, body_range.load_ratio),
     )
     for kind in (
@@ -51,136 +51,137 @@ def flexibility_risks(found: Sequence[ModelRange]) -> list[Risk]:
     ):
         kind_risks = [risk for body_range in worst_first if (risk := kind(body_range)) is not None]
         if kind_risks:
-            more = (
-                f" (and {len(kind_risks) - 1} more bodies likewise)" if len(kind_risks) > 1 else ""
-            )
-            rows.append(replace(kind_risks[0], means=kind_risks[0].means + more))
+            more = f" (and {len(kind_risks) - 1} more bodies)" if len(kind_risks) > 1 else ""
+            rows.append(replace(kind_risks[0], description=kind_risks[0].description + more))
     return rows
 
 
-def _stiffening_risk(one: ModelRange) -> Risk | None:
-    if one.stiffening:
+def _stiffening_risk(body: ModelRange) -> Risk | None:
+    if body.stiffening:
         return None
-    stiffening_remedy = 'use flexibility = "coupled"' if one.one_way else "leave stiffening on"
+    stiffening_remedy = 'use flexibility = "coupled"' if body.one_way else "leave stiffening on"
     limitation = (
-        "responds one way, without stiffening" if one.one_way else "has no geometric stiffening"
+        "has a one-way response without stiffening"
+        if body.one_way
+        else "has no geometric stiffening"
     )
-    if one.spin_ratio > MAX_SPIN_RATIO:
+    if body.spin_ratio > MAX_SPIN_RATIO:
         remedy = (
-            stiffening_remedy if one.gamma or one.one_way else "model it by beams, or from a mesh"
+            stiffening_remedy if body.gamma or body.one_way else "model it by beams, or from a mesh"
         )
         return Risk(
-            "stiffening", f'"{one.name}"',
-            f'"{one.name}" {limitation} and spins at {one.spin_ratio:.2g} times its '
-            "first frequency: its deflection grows without bound where a real body stiffens",
-            remedy, one.spin_ratio, MAX_SPIN_RATIO,
+            "stiffening", f'"{body.name}"',
+            f'"{body.name}" {limitation} and spins at {body.spin_ratio:.2g} times its '
+            "first frequency: its deflection grows without bound, while a real body stiffens",
+            remedy, body.spin_ratio, MAX_SPIN_RATIO,
         )  # fmt: skip
-    if one.load_ratio > MAX_LOAD_RATIO:
+    if body.load_ratio > MAX_LOAD_RATIO:
         return Risk(
-            "stiffening", f'"{one.name}"',
-            f'"{one.name}" {limitation}, but its loads change its stiffness by '
-            f"{one.load_ratio:.0%} (gamma): deflections err by about as much",
-            stiffening_remedy, one.load_ratio, MAX_LOAD_RATIO,
+            "stiffening", f'"{body.name}"',
+            f'"{body.name}" {limitation}, but its loads change its stiffness by '
+            f"{body.load_ratio:.0%} (gamma): relative error of deflections of the same size",
+            stiffening_remedy, body.load_ratio, MAX_LOAD_RATIO,
         )  # fmt: skip
     return None
 
 
-def _slope_risk(one: ModelRange) -> Risk | None:
-    if one.slope <= MAX_SLOPE:
+def _slope_risk(body: ModelRange) -> Risk | None:
+    if body.slope <= MAX_SLOPE:
         return None
     return Risk(
         "slope",
-        f'"{one.name}"',
-        f'"{one.name}" bends by a slope of {one.slope:.2g} against its floating frame; beyond '
-        f"{MAX_SLOPE:g} one frame is too little (error up to {one.frame_error:.0%} of the "
-        f"deflection, "
-        f"{min(one.shortening_error, 9.99):.0%} of the shortening)",
+        f'"{body.name}"',
+        f'"{body.name}" bends to a slope of {body.slope:.2g} relative to its floating frame; above '
+        f"{MAX_SLOPE:g} one frame is not accurate (error up to {body.frame_error:.0%} of the "
+        f"deflection, {min(body.shortening_error, 9.99):.0%} of the foreshortening)",
         "split the body into welded parts",
-        one.slope,
+        body.slope,
         MAX_SLOPE,
     )
 
 
-def _strain_risk(one: ModelRange) -> Risk | None:
-    if one.strain is None or one.strain <= MAX_STRAIN:
+def _strain_risk(body: ModelRange) -> Risk | None:
+    if body.strain is None or body.strain <= MAX_STRAIN:
         return None
     return Risk(
-        "strain", f'"{one.name}"',
-        f'"{one.name}" is strained by {one.strain:.2g}; beyond {MAX_STRAIN:g} the model, which is '
-        "linear in the strain, has no meaning", "check stiffness and loads", one.strain, MAX_STRAIN,
+        "strain", f'"{body.name}"',
+        f'the strain of "{body.name}" reaches {body.strain:.2g}; above {MAX_STRAIN:g} its model, '
+        "linear in the strain, is not valid", "check stiffness and loads", body.strain, MAX_STRAIN,
     )  # fmt: skip
 
 
-def _rotation_risk(one: ModelRange) -> Risk | None:
-    if one.turn <= MAX_ROTATION:
+def _rotation_risk(body: ModelRange) -> Risk | None:
+    if body.turn <= MAX_ROTATION:
         return None
     return Risk(
         "turn",
-        f'"{one.name}"',
-        f'a section of "{one.name}" turns by {one.turn:.2g} rad against its floating frame; the '
-        "model has no meaning beyond 1.5 rad",
+        f'"{body.name}"',
+        f'a section of "{body.name}" rotates by {body.turn:.2g} rad relative to its floating '
+        "frame; "
+        "the model is not valid above 1.5 rad",
         "split the body into welded parts",
-        one.turn,
+        body.turn,
         MAX_ROTATION,
         "rad",
     )
 
 
-def _shape_risk(one: ModelRange) -> Risk | None:
-    if one.tail is None or one.tail <= MAX_MISSED_SHARE:
+def _shape_risk(body: ModelRange) -> Risk | None:
+    if body.tail is None or body.tail <= MAX_MISSED_SHARE:
         return None
-    is_beam = one.tail_of == BENDING_ENERGY
+    is_beam = body.tail_of == BENDING_ENERGY
     basis_remedy = 'basis = "static+fixed-interface"' if is_beam else "static_shapes at its ends"
     return Risk(
         "shapes",
-        f'"{one.name}"',
-        f'the shapes of "{one.name}" miss {one.tail:.0%} of {"its" if is_beam else "the"} '
-        f"{one.tail_of}",
-        f"take more modes, or {basis_remedy}, which carries the loads of its hinges",
-        one.tail,
+        f'"{body.name}"',
+        f'the shapes of "{body.name}" miss {body.tail:.0%} of {"its" if is_beam else "the"} '
+        f"{body.tail_of}",
+        f"use more modes, or {basis_remedy}, which represents the loads of its hinges",
+        body.tail,
         MAX_MISSED_SHARE,
     )
 
 
-def _unshaped_risk(one: ModelRange) -> Risk | None:
-    if one.unshaped is None:
+def _unshaped_risk(body: ModelRange) -> Risk | None:
+    if body.unshaped is None:
         return None
     return Risk(
-        "shapes", f'"{one.name}"',
-        f'the loads of "{one.name}" would {one.unshaped}, but it has no shapes there and stays '
-        "rigid", f"add {one.unshaped.direction} = 2 to its modes",
-        one.unshaped.size, one.unshaped.limit, one.unshaped.unit,
+        "shapes", f'"{body.name}"',
+        f'the loads of "{body.name}" would {body.unshaped}, but it has no shape functions for '
+        "this and stays rigid", f"add {body.unshaped.direction} = 2 to its modes",
+        body.unshaped.size, body.unshaped.limit, body.unshaped.unit,
     )  # fmt: skip
 
 
-def _buckling_risk(one: ModelRange) -> Risk | None:
-    if one.gamma is None or one.gamma[0] >= MIN_BUCKLING_RATIO:
+def _buckling_risk(body: ModelRange) -> Risk | None:
+    if body.gamma is None or body.gamma[0] >= MIN_BUCKLING_RATIO:
         return None
     return Risk(
-        "buckling", f'"{one.name}"',
-        f'its loads take {-one.gamma[0]:.0%} of the stiffness of "{one.name}" (gamma): it is at '
-        "its buckling load, by compression, or sideways by bending moments at work on its twist",
-        "make it stiffer, or its loads less", one.gamma[0], MIN_BUCKLING_RATIO,
+        "buckling", f'"{body.name}"',
+        f'loads reduce the stiffness of "{body.name}" by {-body.gamma[0]:.0%} (gamma): it is at '
+        "its buckling load, by compression or, with twist, by lateral buckling under bending",
+        "increase its stiffness, or reduce its loads", body.gamma[0], MIN_BUCKLING_RATIO,
     )  # fmt: skip
 
 
-def _lateral_buckling_risk(one: ModelRange) -> Risk | None:
-    if one.sideways is None or one.sideways < -MIN_BUCKLING_RATIO:
+def _lateral_buckling_risk(body: ModelRange) -> Risk | None:
+    if body.sideways is None or body.sideways < -MIN_BUCKLING_RATIO:
         return None
     return Risk(
-        "buckling", f'"{one.name}"',
-        f'the loads of "{one.name}" reach {one.sideways:.0%} of those that buckle it out of the '
-        "plane of its shapes, which does not show", "give it shapes of y, z and twist",
-        one.sideways, -MIN_BUCKLING_RATIO,
+        "buckling", f'"{body.name}"',
+        f'the loads of "{body.name}" reach {body.sideways:.0%} of the lateral buckling load, out '
+        "of the plane of its shape functions, which the model does not include",
+        "give it shapes of y, z and twist",
+        body.sideways, -MIN_BUCKLING_RATIO,
     )  # fmt: skip
 
 
-def _shear_risk(one: ModelRange) -> Risk | None:
-    if one.shear is None or one.shear <= MAX_SHEAR_ERROR:
+def _shear_risk(body: ModelRange) -> Risk | None:
+    if body.shear is None or body.shear <= MAX_SHEAR_ERROR:
         return None
     return Risk(
-        "shear", f'"{one.name}"',
-        f'shapes by which "{one.name}" bends are too short for a beam without shear: their '
-        f"frequencies err by about {min(one.shear, 1.0):.0%}, by the share that they have",
-        "take an elastic body", one.shear, MAX_SHEAR_ERROR,
+        "shear", f'"{body.name}"',
+        f'bending shapes of "{body.name}" are too short for a beam without shear: weighted error '
+        f"of their frequencies about {min(body.shear, 1.0):.0%}",
+        "use an elastic body", body.shear, MAX_SHEAR_ERROR,
     )  # fmt: skip

@@ -71,7 +71,7 @@ class LineLoad:
 
 def section_loads(
     motion: Motion,
-    places: Array,
+    positions: Array,
     gravity: Array,
     held: float,
     points: Sequence[PointLoad] = (),
@@ -85,9 +85,9 @@ def section_loads(
     the beam is attached to the tree: loads there are not needed, because the loads of the free side
     are summed. At a concentrated load, the values are those on its inboard side.
     """
-    edges = _panel_edges(motion, places, points, lines)
+    edges = _panel_edges(motion, positions, points, lines)
     rows = max(1, _MAX_BATCH_NUMBERS // (3 * _GAUSS_POINTS * len(edges)))
-    force, moment = (np.empty((len(motion.t), len(places), 3)) for _ in range(2))
+    force, moment = (np.empty((len(motion.t), len(positions), 3)) for _ in range(2))
     for first in range(0, len(motion.t), rows):
         samples = slice(first, first + rows)
         sampled_points, sampled_lines = (
@@ -95,17 +95,17 @@ def section_loads(
             [p.some(samples) for p in lines],
         )
         sums = _PanelSums(motion.some(samples), edges, gravity, sampled_points, sampled_lines)
-        force[samples], moment[samples] = sums.at(places, held)
+        force[samples], moment[samples] = sums.section_loads(positions, held)
     return force, moment
 
 
 def _panel_edges(
-    motion: Motion, places: Array, points: Sequence[PointLoad], lines: Sequence[LineLoad]
+    motion: Motion, stations: Array, points: Sequence[PointLoad], lines: Sequence[LineLoad]
 ) -> Array:
     """Edges of the panels; no load jumps within a panel."""
     shapes = motion.shapes
     count = max(_MIN_PANELS, 2 * motion.eta.shape[1])
-    positions = [np.linspace(0.0, shapes.length, count + 1), places, np.asarray(shapes.pieces)]
+    positions = [np.linspace(0.0, shapes.length, count + 1), stations, np.asarray(shapes.pieces)]
     positions += [np.array([p.x]) for p in points]
     positions += [np.array([p.first, p.last]) for p in lines]
     return np.unique(np.clip(np.concatenate(positions), 0.0, shapes.length))
@@ -146,26 +146,26 @@ class _PanelSums:
         position = _deflected_positions(self.motion, np.array([load.x]))[:, 0]
         return np.concatenate([force, moment + np.cross(position, force)], axis=1)
 
-    def at(self, places: Array, held: float) -> tuple[Array, Array]:
+    def section_loads(self, positions: Array, held: float) -> tuple[Array, Array]:
         """Force and moment at the sections, section axes."""
         zero = np.zeros((len(self.panels), 1, 6))
         inboard_sums = np.concatenate([zero, np.cumsum(self.panels, axis=1)], axis=1)
         outboard_sums = np.concatenate(
             [np.cumsum(self.panels[:, ::-1], axis=1)[:, ::-1], zero], axis=1
         )
-        edge_indices = np.searchsorted(self.edges, places)
+        edge_indices = np.searchsorted(self.edges, positions)
         # At the inboard section the part beyond is that on the outer side, unless it is the tip.
-        outer = places >= held if held < self.motion.shapes.length else places > held
+        outer = positions >= held if held < self.motion.shapes.length else positions > held
         total = np.where(
             outer[:, None], outboard_sums[:, edge_indices], -inboard_sums[:, edge_indices]
         )
         for x, wrench in self.points:
-            is_beyond = outer & (x >= places) & (x != held)
-            is_below = ~outer & (x <= places) & (x != held)
+            is_beyond = outer & (x >= positions) & (x != held)
+            is_below = ~outer & (x <= positions) & (x != held)
             total = total + wrench[:, None] * (is_beyond.astype(float) - is_below)[:, None]
         force = total[:, :, :3]
-        moment = total[:, :, 3:] - np.cross(_deflected_positions(self.motion, places), force)
-        rotations = section_rotations(rotation_vectors(self.motion, places))
+        moment = total[:, :, 3:] - np.cross(_deflected_positions(self.motion, positions), force)
+        rotations = section_rotations(rotation_vectors(self.motion, positions))
         return np.einsum("tmji,tmj->tmi", rotations, force), np.einsum(
             "tmji,tmj->tmi", rotations, moment
         )
@@ -202,8 +202,8 @@ def _load_densities(motion: Motion, x: Array, gravity: Array) -> tuple[Array, Ar
         for modal, term in zip((motion.eta, motion.etad, motion.etadd), second, strict=True)
     )
     position[..., 0] += x
-    w = motion.frame_spin[:, None]
-    wd = motion.frame_spin_rate[:, None]
+    w = motion.frame_angular_velocity[:, None]
+    wd = motion.frame_angular_acceleration[:, None]
     frame_velocity = np.cross(w, position)
     acceleration = (
         motion.frame_acceleration[:, None] + np.cross(wd, position) + np.cross(w, frame_velocity)
@@ -237,11 +237,13 @@ def _rotary_inertia_moment(
         return np.zeros((len(motion.t), len(per_length), 3))
     if not motion.body.points:
         rows = motion.shapes.rows
-        theta = np.moveaxis(motion.shapes.carried(rows(x, 1), rows(x, 0)[3]), 2, 0)
+        theta = np.moveaxis(motion.shapes.inertia_rotation(rows(x, 1), rows(x, 0)[3]), 2, 0)
     rotation, rate, growth = _section_rotation(motion, theta, turned)
-    w = tilde(motion.frame_spin)[:, None]
+    w = tilde(motion.frame_angular_velocity)[:, None]
     acceleration = (
-        (tilde(motion.frame_spin_rate)[:, None] + w @ w) @ rotation + 2 * w @ rate + growth
+        (tilde(motion.frame_angular_acceleration)[:, None] + w @ w) @ rotation
+        + 2 * w @ rate
+        + growth
     )
     second = np.zeros((len(x), 3, 3))
     second[:, 1, 1], second[:, 2, 2] = per_length[:, 2], per_length[:, 1]

@@ -48,7 +48,7 @@ class ShapePanel:
 
 def panel_names(result: Record) -> Iterator[str]:
     """Names of all shape panels of a result."""
-    bodies = result.model.flexible
+    bodies = result.model.flexible_bodies
     if bodies:
         yield "shape"
     for name, body in bodies.items():
@@ -74,12 +74,12 @@ def _drawn_samples(result: Record) -> NDArray[np.int64]:
     """Indices of the samples to draw; SceneError if there are none."""
     valid_samples = np.flatnonzero(np.isfinite(result.q).all(axis=1))
     if not len(valid_samples):
-        raise SceneError("there are no shapes to draw: the run has no sample; ask for other times")
+        raise SceneError("no shapes to draw: the run has no samples; give other output times")
     return valid_samples[shape_samples(result.t[valid_samples], MAX_SHAPES)]
 
 
 def _strip_panel(result: Record, bodies: list[str] | None) -> ShapePanel:
-    body_names = list(result.model.flexible) if bodies is None else bodies
+    body_names = list(result.model.flexible_bodies) if bodies is None else bodies
     samples = _drawn_samples(result)
     strips = [_body_strip(result, name, samples) for name in body_names[:_MAX_BODIES]]
     rigid = [] if bodies is not None else _rigid_lines(result, samples)
@@ -128,6 +128,6 @@ def _draw_body_deflections(result: Record, name: str, figure: Any, axis: Any) ->
 
 
 def _draw_body_energies(result: Record, name: str, figure: Any, axis: Any) -> None:
-    body = result.model.flexible[name]
+    body = result.model.flexible_bodies[name]
     t, energies = curve(result.t, result.quantity(f"{name}.modal_energy"))
     draw_energies(axis, t, np.maximum(energies, 0.0), body.modes, name)

@@ -55,18 +55,20 @@ def unshaped_deformation(
     `force` and `moment` (n, m, 3) in N and N*m are the section loads at the points x (m,) of a
     quadrature rule with `weights` (m), and `slope` is the largest slope of the shape functions.
     """
-    found = (
+    deformations = (
         UnshapedDeformation(direction, float(np.max(np.abs(load) @ (weights / stiffness))))
         for direction, stiffness, load in _unshaped_loads(body, x, force, moment)
     )
     significant = [
         deformation
-        for deformation in found
+        for deformation in deformations
         if np.isfinite(deformation.size)
         and deformation.size > deformation.limit
         and deformation.size > _NEGLIGIBLE_SHARE * slope
     ]
-    return max(significant, key=lambda one: one.size / one.limit, default=None)
+    return max(
+        significant, key=lambda deformation: deformation.size / deformation.limit, default=None
+    )
 
 
 def unshaped_directions(body: ModalBody) -> list[str]:

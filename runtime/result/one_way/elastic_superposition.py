@@ -58,13 +58,13 @@ class SmallMotion:
     """Small motion of a rigid frame: displacement a + psi x r of every point r."""
 
     origin: Jet
-    turn: Jet
+    rotation: Jet
 
     def __add__(self, other: SmallMotion) -> SmallMotion:
-        return SmallMotion(self.origin + other.origin, self.turn + other.turn)
+        return SmallMotion(self.origin + other.origin, self.rotation + other.rotation)
 
     def __neg__(self) -> SmallMotion:
-        return SmallMotion(-self.origin, -self.turn)
+        return SmallMotion(-self.origin, -self.rotation)
 
 
 class Superposition:
@@ -74,24 +74,24 @@ class Superposition:
         self, model: CompiledScene, rigid: Observations, responses: Mapping[str, Response]
     ) -> None:
         self.model, self.rigid, self.responses = model, rigid, responses
-        self.known = rigidified_bodies(model)
+        self.substitution = rigidified_bodies(model)
         packed = rigid.engine.packed
         self.topology, self.hinges = packed.topology, packed.scene.hinges
         self.names, self.order = packed.scene.bodies, packed.topology.order
-        self.ends = frozenset(self.known.nodes.values())
+        self.ends = frozenset(self.substitution.nodes.values())
         self._sections: dict[tuple[str, str], SmallMotion] = {}
-        self._held: dict[str, SmallMotion] = {}
+        self._constrained_motions: dict[str, SmallMotion] = {}
 
-    def moved(self, reference: str) -> Array:
+    def superposed_motion(self, reference: str) -> Array:
         """Motion (n, 24) of "body" or "body.end" including elastic motions inboard of it.
 
         Columns as in `Observations.points`.
         """
         points = self.rigid.points(reference)
-        small = self.on_way(reference)
+        small = self.small_motion(reference)
         return points if small is None else _add_small_motion(points, small)
 
-    def on_way(self, reference: str) -> SmallMotion | None:
+    def small_motion(self, reference: str) -> SmallMotion | None:
         """Small motion at a reference; None if no one-way body is inboard of it."""
         body_index = self.rigid.engine.packed.end(reference)[0]
         body, end = split_reference(reference)
@@ -103,12 +103,13 @@ class Superposition:
             if name in self.ends and is_passed_on:
                 exit_end = split_node(name)[1]
             if name in self.responses:
-                contribution = -self.held(name)
+                contribution = -self.constrained_motion(name)
                 if exit_end:
                     contribution = contribution + self.section(name, exit_end)
                 total, exit_end = contribution if total is None else total + contribution, ""
             is_passed_on = (
-                self.hinges.name(self.topology.at(body_index)[1]) not in self.known.looped
+                self.hinges.name(self.topology.scene_indices(body_index)[1])
+                not in self.substitution.loop_hinges
             )
             body_index = self.topology.parents[body_index]
         return total
@@ -116,7 +117,9 @@ class Superposition:
     def section(self, name: str, end: str) -> SmallMotion:
         """Small motion of a section of a one-way body relative to its rigid position."""
         if (name, end) not in self._sections:
-            self._sections[name, end] = self._section(name, self.known.one_way[name].ports[end])
+            self._sections[name, end] = self._section(
+                name, self.substitution.one_way[name].ports[end]
+            )
         return self._sections[name, end]
 
     def _section(self, name: str, port: ModalPort) -> SmallMotion:
@@ -128,15 +131,18 @@ class Superposition:
         rotation = _to_inertial(points, *(eta @ port.theta.T for eta in rates))
         return SmallMotion(shift + -rotation.cross(position), rotation)
 
-    def held(self, name: str) -> SmallMotion:
+    def constrained_motion(self, name: str) -> SmallMotion:
         """Part of the inboard section's small motion that the hinge there constrains."""
-        if name not in self._held:
-            self._held[name] = self._constrained(name)
-        return self._held[name]
+        if name not in self._constrained_motions:
+            self._constrained_motions[name] = self._find_constrained_motion(name)
+        return self._constrained_motions[name]
 
-    def _constrained(self, name: str) -> SmallMotion:
-        end = self.known.held[name]
-        port, hinge = self.known.one_way[name].ports[end], self.known.holders.get(name)
+    def _find_constrained_motion(self, name: str) -> SmallMotion:
+        end = self.substitution.inboard_ends[name]
+        port, hinge = (
+            self.substitution.one_way[name].ports[end],
+            self.substitution.inboard_hinges.get(name),
+        )
         shift = port.phi
         if hinge is None or (hinge.facts is not None and hinge.facts.free_body):
             shift = np.zeros_like(shift)
@@ -174,8 +180,8 @@ def _to_inertial(points: Array, value: Array, rate: Array, second: Array) -> Jet
 def _add_small_motion(points: Array, small: SmallMotion) -> Array:
     """Points (n, 24) with a small motion added: positions to first order, rotations exp(psi~) R."""
     origin = _origin_motion(points)
-    origin = origin + small.origin + small.turn.cross(origin)
-    spin, spin_rate, small_rotation = points[:, 9:12], points[:, 12:15], small.turn
+    origin = origin + small.origin + small.rotation.cross(origin)
+    spin, spin_rate, small_rotation = points[:, 9:12], points[:, 12:15], small.rotation
     result = np.array(points)
     result[:, 0:9] = np.concatenate([origin.value, origin.rate, origin.second], axis=1)
     result[:, 9:12] = spin + small_rotation.rate + np.cross(small_rotation.value, spin)

@@ -33,7 +33,7 @@ class Cells:
     breaks: frozenset[int]
 
     @classmethod
-    def between(cls, times: Array, cells: int) -> Cells:
+    def from_times(cls, times: Array, cells: int) -> Cells:
         """Cells from the first to the last of `times`, about `cells`, with edges at all times."""
         share = np.diff(times) / (times[-1] - times[0])
         counts = np.maximum(np.ceil(cells * share), 1).astype(int)

@@ -91,7 +91,7 @@ class OneWayResponses:
         return (Risk(
             "one-way-loads", RUN,
             f"one-way response: the loads of the rigid run change too fast for {self.cost.cells} "
-            f"cells (steps of {self.cost.error:.1g} of the largest)", "simulate a shorter time",
+            f"cells (jumps of {self.cost.error:.1g} of the largest)", "simulate a shorter time",
             self.cost.error, 10 * LOAD_TOLERANCE,
         ),)  # fmt: skip
 
@@ -109,7 +109,7 @@ def compute_responses(model: CompiledScene, run: Trajectory) -> OneWayResponses:
     if break_times[-1] == break_times[0]:
         return OneWayResponses(_start_responses(model, run), ResponseCost(0, 0, 0, total, 0.0))
     while True:
-        grid = Cells.between(break_times, cells)
+        grid = Cells.from_times(break_times, cells)
         load_run = _rerun_at_samples(model, run, grid)
         evaluations += load_run.statistics.evaluations
         observed = Observations(model, load_run)
@@ -137,7 +137,7 @@ def compute_responses(model: CompiledScene, run: Trajectory) -> OneWayResponses:
 
 def rigidified_bodies(model: CompiledScene) -> RigidSubstitution:
     """Substitution of the bodies that are rigid in a model's runs."""
-    expanded = model.packed.expanded
+    expanded = model.packed_scene.expanded
     assert expanded is not None and expanded.rigidified is not None
     return expanded.rigidified
 
@@ -146,7 +146,7 @@ def _break_times(model: CompiledScene, run: Trajectory) -> Array:
     """Times of the start, the last sample, and possible jumps or narrow features of loads."""
     first, last = run.settings.t_start, float(np.max(run.t, initial=run.settings.t_start))
     events = run.t[np.flatnonzero(run.event)]
-    time_map = model.packed.time_map(first, last)
+    time_map = model.packed_scene.time_map(first, last)
     inner_times = [t for t in (*time_map.breaks, *time_map.starts, *events) if first < t < last]
     times = np.unique([first, *inner_times, last])
     is_distinct = np.diff(times) > _MIN_EDGE_DISTANCE * (
@@ -199,8 +199,8 @@ def modal_loads(model: CompiledScene, body: ModalBody, observed: Observations) -
         "motion": np.concatenate([spin, spin_rate, acceleration], axis=1),
     }  # fmt: skip
     loads = -evaluate(kernel("residual"), inputs, body.n)["e_f"]
-    inboard_end = rigid.held[body.name]
-    inboard_hinge = rigid.holders.get(body.name)
+    inboard_end = rigid.inboard_ends[body.name]
+    inboard_hinge = rigid.inboard_hinges.get(body.name)
     hinge_loads = [] if inboard_hinge is None else [(inboard_end, inboard_hinge.name, 1.0)]
     welds = [node for node in rigid.nodes.values() if split_node(node)[0] == body.name]
     hinge_loads += [(split_node(node)[1], node, -1.0) for node in welds]
@@ -213,7 +213,7 @@ def modal_loads(model: CompiledScene, body: ModalBody, observed: Observations) -
 
 def _require_finite(loads: Array, name: str, observed: Observations) -> Array:
     if not np.isfinite(loads).all():
-        reason = next(iter(observed.failures), "they are beyond what numbers hold")
+        reason = next(iter(observed.failures), "overflow")
         raise NumericalFailure(f'one-way response: no loads on the shapes of "{name}": {reason}')
     return loads
 

@@ -39,9 +39,9 @@ def _coupling_risk(share: tuple[str, float]) -> Risk:
     name, chi = share
     return Risk(
         "one-way-coupling", f'"{name}"',
-        f'the vibration of "{name}" moves the hinge that carries it: a shape holds {chi:.2g} of '
-        "the inertia there (chi), so that the one-way response may err by "
-        f"{3 * chi / (1 - chi):.1f} of its deflection", 'use flexibility = "coupled"', chi,
+        f'the vibration of "{name}" moves its inboard hinge: a shape has {chi:.2g} of the inertia '
+        "there (chi), so that the relative error of the one-way response may reach "
+        f"{3 * chi / (1 - chi):.1f}", 'use flexibility = "coupled"', chi,
         MAX_UNCOUPLED_SHARE,
     )  # fmt: skip
 
@@ -49,12 +49,14 @@ def _coupling_risk(share: tuple[str, float]) -> Risk:
 def _release_risks(model: CompiledScene) -> tuple[Risk, ...]:
     """Findings: each one-way body whose hinge releases it."""
     releasing_hinges, rigid = set(releasable_hinges(model.scene)), rigidified_bodies(model)
-    holders = {body: h.name for body, h in rigid.holders.items() if h.name in releasing_hinges}
+    holders = {
+        body: h.name for body, h in rigid.inboard_hinges.items() if h.name in releasing_hinges
+    }
     return tuple(
         Risk(
             "one-way-release", f'"{name}"',
-            f'hinge "{holders[name]}" lets go of "{name}", whose response stays that of a held '
-            "body", 'use flexibility = "coupled"',
+            f'hinge "{holders[name]}" releases "{name}", whose one-way response remains that of an '
+            "attached body", 'use flexibility = "coupled"',
         )
         for name in rigid.one_way
         if name in holders
@@ -64,8 +66,8 @@ def _release_risks(model: CompiledScene) -> tuple[Risk, ...]:
 def _impact_risk(name: str) -> Risk:
     return Risk(
         "one-way-blow", f'"{name}"',
-        f'the run has blows, of which the response of "{name}" knows nothing: it follows the loads '
-        "between them alone", 'use flexibility = "coupled"',
+        f'the run has impacts, which do not excite the one-way response of "{name}": it follows '
+        "the loads between them only", 'use flexibility = "coupled"',
     )  # fmt: skip
 
 
@@ -81,8 +83,8 @@ class OneWayResult(Result):
         self, model: CompiledScene, run: Trajectory, error: ErrorEstimate | None = None
     ) -> None:
         super().__init__(model, run, error)
-        self._observed = _SuperposedObservations(self, self._observed)
-        self._quantities = Quantities(self._observed, self)
+        self._observations = _SuperposedObservations(self, self._observations)
+        self._quantities = Quantities(self._observations, self)
 
     @cached_property
     def rigid(self) -> Result:
@@ -102,14 +104,12 @@ class OneWayResult(Result):
         """Modal coordinates of a one-way body with their rates; SceneError for other names."""
         responses = self._one_way.responses
         if body not in responses:
-            raise SceneError(
-                f'"{body}": expected a body that responds one way: {", ".join(responses)}'
-            )
+            raise SceneError(f'"{body}": expected a one-way body: {", ".join(responses)}')
         return responses[body]
 
-    def _outside(self) -> tuple[Risk, ...]:
+    def _model_risks(self) -> tuple[Risk, ...]:
         """Findings of any result, and those about the elastic response."""
-        risks = (*super()._outside(), *self._one_way.risks, *_release_risks(self.model))
+        risks = (*super()._model_risks(), *self._one_way.risks, *_release_risks(self.model))
         if has_impacts(self):
             risks = (*risks, *map(_impact_risk, rigidified_bodies(self.model).one_way))
         return (*risks, *map(_coupling_risk, self.couplings.items()))
@@ -137,7 +137,7 @@ class _SuperposedObservations(Observations):
     def __init__(self, result: OneWayResult, rigid: Observations) -> None:
         super().__init__(result.model, result.trajectory)
         self._result, self._rigid = result, rigid
-        self._moved: dict[str, Array] = {}
+        self._motions: dict[str, Array] = {}
 
     @cached_property
     def _superposition(self) -> Superposition:
@@ -145,23 +145,23 @@ class _SuperposedObservations(Observations):
 
     def points(self, reference: str) -> Array:
         """Motion (n, 24) of "body" or "body.end", see `Observation`."""
-        if reference not in self._moved:
-            motion = self._superposition.moved(reference)
+        if reference not in self._motions:
+            motion = self._superposition.superposed_motion(reference)
             motion.flags.writeable = False
-            self._moved[reference] = motion
-        return self._moved[reference]
+            self._motions[reference] = motion
+        return self._motions[reference]
 
 
 class _OneWayBodies(FlexibleBodies):
     """Motions of coupled bodies in the run, and of one-way bodies with their response."""
 
     def __init__(self, result: OneWayResult) -> None:
-        super().__init__(result.model, result._observed)
+        super().__init__(result.model, result._observations)
         self._result = result
         rigid = rigidified_bodies(result.model)
-        self._responding, self.unbalanced = rigid.one_way, rigid.passed
-        self.known = {**self.known, **self._responding}
-        self.one_way = self._responding
+        self._one_way_bodies, self.unbalanced = rigid.one_way, rigid.passed
+        self.modal_bodies = {**self.modal_bodies, **self._one_way_bodies}
+        self.one_way = self._one_way_bodies
 
     def coupled_start(self) -> tuple[CompiledScene, Array]:
         """Model in which all flexible bodies are coupled, and its q at the start of the run."""
@@ -174,12 +174,12 @@ class _OneWayBodies(FlexibleBodies):
 
     def motion(self, name: str, what: str = "its motion") -> Motion:
         """Motion of one flexible body."""
-        if name not in self._responding:
+        if name not in self._one_way_bodies:
             return super().motion(name, what)
         if name not in self._motions:
-            response, points = self._result.response(name), self.observed.points(name)
+            response, points = self._result.response(name), self.observations.points(name)
             self._motions[name] = Motion(
-                self._responding[name], self.run.t, response.eta, response.etad, response.etadd,
+                self._one_way_bodies[name], self.run.t, response.eta, response.etad, response.etadd,
                 points[:, 0:3], points[:, 15:24].reshape(-1, 3, 3), points[:, 3:6],
                 points[:, 9:12], points[:, 6:9], points[:, 12:15],
             )  # fmt: skip

@@ -44,7 +44,9 @@ class DefaultPanel:
     @property
     def sentence(self) -> str:
         """Note on what is left out, and how to get it; "" if nothing."""
-        return f"{self.more}: name what else you want, such as {self.other}" if self.more else ""
+        return (
+            f"{self.more}: give other quantities by name, such as {self.other}" if self.more else ""
+        )
 
 
 def rate_candidates(shown: QuantitySource, names: Iterable[str]) -> Iterator[Candidate]:
@@ -62,7 +64,7 @@ def choose_panels(
 ) -> list[DefaultPanel]:
     """Choose the candidates that move most, grouped by unit in their order."""
     units: dict[str, list[tuple[str, float]]] = {}
-    for name, unit, excursion in shown.candidates():
+    for name, unit, excursion in shown.default_quantities():
         units.setdefault(unit, []).append((name, excursion))
     return [_default_panel(unit, some, lines) for unit, some in islice(units.items(), panels)]
 
@@ -91,7 +93,7 @@ def default_candidates(result: Record) -> list[Candidate]:
                 result, [text for quantity in quantities for text in column_labels(quantity)]
             )
         )
-    hinges = list(islice(result.model.layout.hinges.values(), _MAX_HINGES))
+    hinges = list(islice(result.model.coordinate_layout.hinges.values(), _MAX_HINGES))
     quaternion_hinges = [hinge.name for hinge in hinges if hinge.quaternion is not None]
     angles = [
         f"{name}.{angle}"
@@ -128,7 +130,7 @@ def _deflection_names(result: Record) -> Iterator[str]:
 
     The modal coordinate is used for a body whose frame follows its tip or that is not a beam.
     """
-    for name, body in islice(result.model.flexible.items(), _MAX_BEAMS):
+    for name, body in islice(result.model.flexible_bodies.items(), _MAX_BEAMS):
         if body.shapes is None:
             yield f"{name}.{body.modes[0]}"
             continue

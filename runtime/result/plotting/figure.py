@@ -75,7 +75,10 @@ class PlottedFigure:
 
 
 def draw_runs(
-    runs: Mapping[str, PlotSource], wanted: PlotSelection, title: str | None = None, ax: Any = None
+    runs: Mapping[str, PlotSource],
+    selection: PlotSelection,
+    title: str | None = None,
+    ax: Any = None,
 ) -> PlottedFigure:
     """Draw runs by their labels in one figure; see `Result.plot`.
 
@@ -85,11 +88,13 @@ def draw_runs(
         if not len(run.t):
             prefix = f"{label}: " if len(runs) > 1 else ""
             raise SceneError(
-                f"{prefix}there is nothing to plot: the run has no sample; ask for other times"
+                f"{prefix}nothing to plot: the run has no samples; give other output times"
             )
-    shapes, curves = _split_names(runs, wanted)
+    shapes, curves = _split_names(runs, selection)
     quantity_panels = (
-        build_panels(runs, replace(wanted, names=curves)) if curves or not wanted.names else []
+        build_panels(runs, replace(selection, names=curves))
+        if curves or not selection.names
+        else []
     )
     return _compose_figure(
         [_shape_panel(runs, name) for name in shapes], shapes, quantity_panels, title, ax
@@ -97,14 +102,14 @@ def draw_runs(
 
 
 def compose_panels(
-    made: Sequence[Panel], title: str | None = None, ax: Any = None
+    panels: Sequence[Panel], title: str | None = None, ax: Any = None
 ) -> PlottedFigure:
     """Compose panels of curves in one figure. EnvironmentFailure without the extra."""
-    return _compose_figure([], (), made, title, ax)
+    return _compose_figure([], (), panels, title, ax)
 
 
 def _compose_figure(
-    pictures: list[ShapePanel], shapes: tuple[str, ...], made: Sequence[Panel], title: str | None,
+    pictures: list[ShapePanel], shapes: tuple[str, ...], panels: Sequence[Panel], title: str | None,
     ax: Any,
 ) -> PlottedFigure:  # fmt: skip
     Figure = figure_class()
@@ -116,10 +121,10 @@ def _compose_figure(
             _PANEL_HEIGHT + (_EXTRA_HEIGHT if panel.alike else 0),
             panel.kind == "time",
         )
-        for panel in made
+        for panel in panels
     ]
     if not pictures:
-        raise SceneError("there is nothing to plot: give the name of a quantity, such as energy")
+        raise SceneError("nothing to plot: give the name of a quantity, such as energy")
     style: Any = _STYLE
     with mpl.rc_context(style):
         if ax is not None:
@@ -130,7 +135,7 @@ def _compose_figure(
             _lay_out(figure, pictures)
         if title:
             figure.suptitle(escape_control_characters(title), parse_math=False)
-    return PlottedFigure(figure, shapes, tuple(made))
+    return PlottedFigure(figure, shapes, tuple(panels))
 
 
 def plot_of(
@@ -153,9 +158,9 @@ def plot_of(
     ).items():
         if other_label in runs:
             raise SceneError(
-                f'beside: "{other_label}" is the label of another run; give each its own'
+                f'beside: "{other_label}" is the label of another run; give each run its own label'
             )
-        if not hasattr(other_run, "candidates"):
+        if not hasattr(other_run, "default_quantities"):
             raise SceneError(
                 f'beside: "{other_label}" = {abbreviate(other_run)}: expected a result'
             )
@@ -169,15 +174,20 @@ def plot_of(
 
 
 def _split_names(
-    runs: Mapping[str, PlotSource], wanted: PlotSelection
+    runs: Mapping[str, PlotSource], selection: PlotSelection
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Names of shape panels, and names of quantities."""
     record: Any = next(iter(runs.values()))
-    names = tuple(dict.fromkeys(wanted.names))
-    if len(runs) > 1 or wanted.kind != "time" or wanted.against or not hasattr(record, "model"):
+    names = tuple(dict.fromkeys(selection.names))
+    if (
+        len(runs) > 1
+        or selection.kind != "time"
+        or selection.against
+        or not hasattr(record, "model")
+    ):
         return (), names
     if not names:
-        return (("shape",) if record.model.flexible else ()), ()
+        return (("shape",) if record.model.flexible_bodies else ()), ()
     shape_names = set(names_of_pictures(record))
     return tuple(x for x in names if x in shape_names), tuple(
         x for x in names if x not in shape_names
@@ -191,10 +201,10 @@ def _shape_panel(runs: Mapping[str, PlotSource], name: str) -> ShapePanel:
     return panel
 
 
-def _lay_out(figure: Any, found: Sequence[ShapePanel]) -> None:
+def _lay_out(figure: Any, shape_panels: Sequence[ShapePanel]) -> None:
     """Arrange the panels in a column; panels over time share one time axis below the last."""
-    groups = [[panel] for panel in found if not panel.over_time]
-    groups += [[panel for panel in found if panel.over_time]]
+    groups = [[panel] for panel in shape_panels if not panel.over_time]
+    groups += [[panel for panel in shape_panels if panel.over_time]]
     groups = [group for group in groups if group]
     heights = [sum(panel.height for panel in group) for group in groups]
     parts = figure.subfigures(len(groups), 1, height_ratios=heights, squeeze=False)[:, 0]
@@ -207,17 +217,17 @@ def _lay_out(figure: Any, found: Sequence[ShapePanel]) -> None:
             axes[-1].set_xlabel("time (s)")
 
 
-def _draw_into(ax: Any, found: Sequence[ShapePanel]) -> Any:
+def _draw_into(ax: Any, shape_panels: Sequence[ShapePanel]) -> Any:
     """Draw into axes of an existing figure."""
     axes = list(np.ravel(np.asarray(ax, dtype=object)))
     if not all(hasattr(axis, "figure") for axis in axes):
         raise SceneError(f"ax = {abbreviate(ax)}: expected axes of matplotlib, or a list of them")
-    if len(axes) != len(found):
+    if len(axes) != len(shape_panels):
         raise SceneError(
-            f"ax: there are {len(found)} panels, one for each unit, and {len(axes)} axes; give as "
-            "many axes, or quantities of one unit"
+            f"ax: there are {len(shape_panels)} panels, one for each unit, and {len(axes)} axes; "
+            "give as many axes, or quantities of one unit"
         )
-    for axis, panel in zip(axes, found, strict=True):
+    for axis, panel in zip(axes, shape_panels, strict=True):
         panel.draw(axis.figure, axis)
         if panel.over_time:
             axis.set_xlabel("time (s)")

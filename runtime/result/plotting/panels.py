@@ -76,25 +76,25 @@ class PlotSelection:
             if not isinstance(name, str):
                 raise SceneError(
                     f'plot: expected the name of a quantity, such as "energy", found {name!r:.60}; '
-                    "of several names each is an argument of its own"
+                    "give several names as separate arguments"
                 )
         expected = f"one of {', '.join(PLOT_KINDS)}"
         if require_word("kind", self.kind, expected) not in PLOT_KINDS:
             raise SceneError(f"kind = {self.kind!r}: expected {expected}")
         if self.against is not None and self.kind != "time":
             raise SceneError(
-                f'against = "{self.against}" beside kind = "{self.kind}": take one of them'
+                f'against = "{self.against}" and kind = "{self.kind}": give only one of them'
             )
 
 
-def build_panels(runs: Mapping[str, PlotSource], wanted: PlotSelection) -> list[Panel]:
+def build_panels(runs: Mapping[str, PlotSource], selection: PlotSelection) -> list[Panel]:
     """Build one panel per unit in the order of the names, with the curves of all runs by label.
 
     SceneError for a name that no run has, and for what cannot be drawn of a quantity.
     """
     first = next(iter(runs.values()))
-    groups = _named_panels(runs, wanted.names) if wanted.names else choose_panels(first)
-    return [_build_panel(runs, group, wanted) for group in groups]
+    groups = _named_panels(runs, selection.names) if selection.names else choose_panels(first)
+    return [_build_panel(runs, group, selection) for group in groups]
 
 
 def _named_panels(runs: Mapping[str, PlotSource], names: Sequence[str]) -> list[DefaultPanel]:
@@ -122,10 +122,10 @@ def _first_quantity(runs: Mapping[str, PlotSource], name: str) -> Quantity:
 
 
 def _build_panel(
-    runs: Mapping[str, PlotSource], group: DefaultPanel, wanted: PlotSelection
+    runs: Mapping[str, PlotSource], group: DefaultPanel, selection: PlotSelection
 ) -> Panel:
     quantities = [_first_quantity(runs, name) for name in group.names]
-    labels = [label for one in quantities for label in column_labels(one)]
+    labels = [label for quantity in quantities for label in column_labels(quantity)]
     is_single = len(labels) == 1
     traces, missing_notes = [], []
     for number, (run_label, run) in enumerate(runs.items()):
@@ -135,7 +135,7 @@ def _build_panel(
             except SceneError:
                 missing_notes.append(f"{run_label} has no {name}")
                 continue
-            for k, (x, y) in enumerate(_drawn_curves(run, quantity, wanted)):
+            for k, (x, y) in enumerate(_drawn_curves(run, quantity, selection)):
                 column = labels[first_column + k]
                 if len(runs) == 1:
                     trace = Trace(column, x, y, number if is_single else first_column + k)
@@ -148,10 +148,10 @@ def _build_panel(
                     )
                 traces.append(trace)
     more = "; ".join(filter(None, (group.more, *missing_notes)))
-    title, x_label, has_equal_scales = _panel_titles(quantities, runs, wanted)
+    title, x_label, has_equal_scales = _panel_titles(quantities, runs, selection)
     notes = (group.sentence, *missing_notes, *(f"{x.name}: {x.note}" for x in quantities if x.note))
     return Panel(
-        title, x_label, wanted.kind if wanted.against is None else "against", group.names,
+        title, x_label, selection.kind if selection.against is None else "against", group.names,
         tuple(traces), more, has_equal_scales, tuple(dict.fromkeys(filter(None, notes))),
     )  # fmt: skip
 
@@ -180,36 +180,36 @@ def _first_columns(quantities: Sequence[Quantity]) -> list[int]:
 
 
 def _panel_titles(
-    quantities: Sequence[Quantity], runs: Mapping[str, PlotSource], wanted: PlotSelection
+    quantities: Sequence[Quantity], runs: Mapping[str, PlotSource], selection: PlotSelection
 ) -> tuple[str, str, bool]:
     """Title, label of the x axis, and whether both axes are lengths."""
     text, unit = common_noun(quantities), quantities[0].unit
-    if wanted.against is not None:
-        abscissa = _require_scalar(_first_quantity(runs, wanted.against))
+    if selection.against is not None:
+        abscissa = _require_scalar(_first_quantity(runs, selection.against))
         x_label = with_unit(common_noun([abscissa]), abscissa.unit)
         return with_unit(text, unit), x_label, unit == abscissa.unit == "m"
-    if wanted.kind == "phase":
+    if selection.kind == "phase":
         return with_unit(f"rate of {text}", rate_unit(unit)), with_unit(text, unit), False
-    if wanted.kind == "spectrum":
+    if selection.kind == "spectrum":
         return with_unit(f"amplitude of {text}", unit), "frequency (Hz)", False
     return with_unit(text, unit), "time (s)", False
 
 
 def _drawn_curves(
-    run: PlotSource, quantity: Quantity, wanted: PlotSelection
+    run: PlotSource, quantity: Quantity, selection: PlotSelection
 ) -> Iterator[tuple[Array, Array]]:
     """Curves (x, y) of every column."""
-    if wanted.kind == "spectrum":
+    if selection.kind == "spectrum":
         frequencies, amplitudes = spectrum(run.t, quantity)
         yield from ((frequencies, column) for column in amplitudes.T)
         return
     t, values = curve(run.t, quantity)
-    if wanted.kind == "phase":
+    if selection.kind == "phase":
         _, rates = curve(run.t, _rate_quantity(quantity))
         yield from zip(values.T, rates.T, strict=True)
         return
-    if wanted.against is not None:
-        _, abscissa = curve(run.t, _require_scalar(run.quantity(wanted.against)))
+    if selection.against is not None:
+        _, abscissa = curve(run.t, _require_scalar(run.quantity(selection.against)))
         t = abscissa[:, 0]
     yield from ((t, column) for column in values.T)
 
@@ -219,8 +219,8 @@ def _rate_quantity(quantity: Quantity) -> Quantity:
     rates: Callable[[], Array] | None = quantity.rates
     if rates is None:
         raise SceneError(
-            f'"{quantity.name}": its rate is not known, so it has no phase picture; draw it '
-            "against another quantity"
+            f'"{quantity.name}": a phase plot needs its rate, which is not available; plot '
+            "it against another quantity"
         )
     return replace(quantity, values=np.asarray(rates()), rates=None)
 
@@ -228,7 +228,7 @@ def _rate_quantity(quantity: Quantity) -> Quantity:
 def _require_scalar(quantity: Quantity) -> Quantity:
     if quantity.labels:
         raise SceneError(
-            f'against "{quantity.name}": it has {len(quantity.labels)} components; take one, such '
+            f'against "{quantity.name}": it has {len(quantity.labels)} components; give one, such '
             f"as {quantity.name}.{quantity.labels[0]}"
         )
     return quantity

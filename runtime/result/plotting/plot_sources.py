@@ -31,6 +31,6 @@ class PlotSource(QuantitySource, Protocol):
     @property
     def t(self) -> Array: ...
 
-    def candidates(self) -> list[Candidate]:
+    def default_quantities(self) -> list[Candidate]:
         """Candidates for default quantities, the most informative kinds first."""
         ...

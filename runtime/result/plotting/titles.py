@@ -39,11 +39,18 @@ def common_noun(quantities: Sequence[Quantity]) -> str:
     """
     first = quantities[0]
     if len(quantities) == 1:
-        return first.long_name if first.owner or not first.what else first.what
+        return first.long_name if first.owner or not first.description else first.description
     owners = list(dict.fromkeys(quantity.owner for quantity in quantities))
-    if len({quantity.what or quantity.long_name for quantity in quantities}) == 1 and first.what:
-        return f"{first.what} of {_join_owners(owners)}" if first.owner else first.what
-    descriptions = list(dict.fromkeys(quantity.what or quantity.name for quantity in quantities))
+    if (
+        len({quantity.description or quantity.long_name for quantity in quantities}) == 1
+        and first.description
+    ):
+        return (
+            f"{first.description} of {_join_owners(owners)}" if first.owner else first.description
+        )
+    descriptions = list(
+        dict.fromkeys(quantity.description or quantity.name for quantity in quantities)
+    )
     if not any(owners) and len(descriptions) <= _MAX_NAMED_OWNERS:
         return ", ".join(descriptions)
     text = _NOUN_BY_UNIT.get(first.unit, "quantities")

@@ -71,7 +71,7 @@ def rigid_body_solids(
             hidden=is_transparent,
         )
     if (body.mass and outer_points) or inertia_box is None:
-        ball = ellipsoid_surface((radius, radius, radius), 12).placed(centre)
+        ball = ellipsoid_surface((radius, radius, radius), 12).with_pose(centre)
         yield Solid(owner, "mass", ball, _darken(colour))
 
 
@@ -109,7 +109,7 @@ def equal_inertia_box(
     edges = np.maximum(edges, _MIN_RADIUS_TO_SIZE * size)
     if np.linalg.det(axes) < 0:
         axes[:, 0] = -axes[:, 0]
-    return box_surface(edges).placed(body.center_of_mass, axes)
+    return box_surface(edges).with_pose(body.center_of_mass, axes)
 
 
 def body_centre(body: BodyTable) -> Array:

@@ -67,8 +67,8 @@ def elastic_surface(
 
 def motion_at(run: Record, name: str, when: FrameTimes, poses: Poses) -> observed.Motion:
     """Motion of a body at the frame times; rates that are not drawn are zero."""
-    motion = run._flexible.motion(name).some(when.kept)
-    eta = when.smooth(motion.eta, motion.etad)
+    motion = run._flexible.motion(name).some(when.samples)
+    eta = when.interpolate_hermite(motion.eta, motion.etad)
     zero_rates, zero_vectors = np.zeros_like(eta), np.zeros((len(eta), 3))
     return observed.Motion(
         motion.body,

@@ -28,7 +28,7 @@ _MAX_POSES = 90_000
 _MIN_FRAMES = 24
 #: Points of a trail from one frame to the next.
 _TRAIL_POINTS_PER_FRAME = 4
-_SPEED_EXPECTATION = "seconds of the run that pass in one second, above 0"
+_SPEED_EXPECTATION = "seconds of the run per second of film, above 0"
 
 
 @dataclass(frozen=True)
@@ -36,20 +36,20 @@ class FrameTimes:
     """Frame times of a film of a run.
 
     Attributes:
-        kept: samples of the run that can be drawn; two at the same time are those before and after
-            an event.
+        samples: samples of the run that can be drawn; two at the same time are those before and
+            after an event.
         t: (n,) s, their times.
         times: (f,) s, the frame times.
         speed: seconds of the run per second of film.
     """
 
-    kept: NDArray[np.int64]
+    samples: NDArray[np.int64]
     t: Array
     times: Array
     speed: float
 
     @classmethod
-    def of(
+    def for_run(
         cls, run: Record, owners: int, speed: float | None, most: int | None = None
     ) -> FrameTimes:
         """Frame times for a scene with `owners` bodies and hinges.
@@ -59,7 +59,7 @@ class FrameTimes:
         """
         finite = np.flatnonzero(np.isfinite(run.q).all(axis=1))
         if not len(finite):
-            raise SceneError("there is nothing to look at: the run has no sample with numbers")
+            raise SceneError("nothing to draw: the run has no sample with finite coordinates")
         finite_samples, t = finite, run.t[finite]
         duration = float(t[-1] - t[0])
         if duration == 0:
@@ -79,36 +79,36 @@ class FrameTimes:
     def _exact(self) -> bool:
         return len(self.times) == len(self.t) and bool(np.array_equal(self.times, self.t))
 
-    def smooth(self, values: Array, rates: Array) -> Array:
+    def interpolate_hermite(self, values: Array, rates: Array) -> Array:
         """Values (n, ...) with their time rates at the frame times, by cubic Hermite pieces."""
         if self._exact:
             return values
         from scipy.interpolate import CubicHermiteSpline
 
-        def between(part: slice, at: Array) -> Array:
+        def interpolate(part: slice, at: Array) -> Array:
             return np.asarray(CubicHermiteSpline(self.t[part], values[part], rates[part])(at))
 
-        return self._pieces(values, between)
+        return self._pieces(values, interpolate)
 
-    def straight(self, values: Array) -> Array:
+    def interpolate_linear(self, values: Array) -> Array:
         """Values (n, k) at the frame times, interpolated linearly between samples."""
 
-        def between(part: slice, at: Array) -> Array:
+        def interpolate(part: slice, at: Array) -> Array:
             columns = [np.interp(at, self.t[part], column) for column in values[part].T]
             return np.array(columns).reshape(len(columns), len(at)).T
 
-        return self._pieces(values, between)
+        return self._pieces(values, interpolate)
 
-    def turned(self, quaternions: Array) -> Array:
+    def interpolate_rotation(self, quaternions: Array) -> Array:
         """Quaternions (n, 4), w first, at the frame times, at constant rates between samples."""
         from scipy.spatial.transform import Rotation, Slerp
 
-        def between(part: slice, at: Array) -> Array:
+        def interpolate(part: slice, at: Array) -> Array:
             turns = Rotation.from_quat(quaternions[part][:, [1, 2, 3, 0]])
             found: Array = Slerp(self.t[part], turns)(at).as_quat()[:, [3, 0, 1, 2]]
             return found
 
-        return self._pieces(quaternions, between)
+        return self._pieces(quaternions, interpolate)
 
     def _pieces(self, values: Array, between: Callable[[slice, Array], Array]) -> Array:
         """Apply `between` to each stretch of samples without an event.
@@ -128,22 +128,26 @@ class FrameTimes:
                 result[inside] = between(part, self.times[inside])
         return result
 
-    def way(self, run: Record, reference: str) -> Array:
+    def path(self, run: Record, reference: str) -> Array:
         """Path (n, 3) in m of a body's origin or an end, in finer time steps than the frames."""
-        trail_times = replace(self, times=np.linspace(self.times[0], self.times[-1], self._fine))
-        points = run._observed.points(reference)[self.kept]
-        return trail_times.smooth(points[:, 0:3], points[:, 3:6])
+        trail_times = replace(
+            self, times=np.linspace(self.times[0], self.times[-1], self._path_point_count)
+        )
+        points = run._observations.points(reference)[self.samples]
+        return trail_times.interpolate_hermite(points[:, 0:3], points[:, 3:6])
 
     @property
-    def _fine(self) -> int:
+    def _path_point_count(self) -> int:
         return _TRAIL_POINTS_PER_FRAME * (len(self.times) - 1) + 1
 
     def poses(self, run: Record, reference: str) -> Poses:
         """Poses of the axes of a body or an end."""
-        points = run._observed.points(reference)[self.kept]
-        position = self.smooth(points[:, 0:3], points[:, 3:6])
+        points = run._observations.points(reference)[self.samples]
+        position = self.interpolate_hermite(points[:, 0:3], points[:, 3:6])
         orientation = quaternions(points[:, 15:24])
-        return Poses(position, orientation if self._exact else self.turned(orientation))
+        return Poses(
+            position, orientation if self._exact else self.interpolate_rotation(orientation)
+        )
 
 
 def natural_speed(lasts: float) -> float:

@@ -42,21 +42,23 @@ def hinge_glyph(hinge: Hinge, r: float) -> Surface | None:
         return box_surface((1.3 * r, 1.3 * r, 1.3 * r))
     axes = np.array(hinge_frames(hinge)[1])
     parts = []
-    if len(facts.turns) == 3 or not facts.steady:
+    if len(facts.turns) == 3 or not facts.constant_subspace:
         parts.append(ellipsoid_surface((r, r, r), 16))
     else:
         parts += [
-            cylinder_surface(0.75 * r, 3.2 * r).placed(axes=axes_along(v))
+            cylinder_surface(0.75 * r, 3.2 * r).with_pose(axes=axes_along(v))
             for v in _rotation_axes(hinge)
         ]
     slides = _slide_axes(hinge)
     if len(slides) == 2:
-        parts.append(box_surface((5 * r, 5 * r, 0.4 * r)).placed(axes=axes))
+        parts.append(box_surface((5 * r, 5 * r, 0.4 * r)).with_pose(axes=axes))
     else:
-        parts += [box_surface((1.1 * r, 1.1 * r, 7 * r)).placed(axes=axes_along(v)) for v in slides]
+        parts += [
+            box_surface((1.1 * r, 1.1 * r, 7 * r)).with_pose(axes=axes_along(v)) for v in slides
+        ]
     if facts.frame == "crossing":
         parts = [
-            cylinder_surface(0.6 * r, 4 * r).placed(axes=axes_along(v))
+            cylinder_surface(0.6 * r, 4 * r).with_pose(axes=axes_along(v))
             for v in _crossing_axes(hinge)
         ]
     return join_surfaces(parts) if parts else ellipsoid_surface((r, r, r), 8)
@@ -84,7 +86,9 @@ def _crossing_axes(hinge: Hinge) -> list[Array]:
 
 def ground_block(at: Array, r: float) -> Solid:
     """Block of an attachment to the ground; `at` (3,) in m."""
-    return Solid("ground", "", box_surface((2.6 * r, 2.6 * r, 2.6 * r)).placed(at), GROUND_COLOUR)
+    return Solid(
+        "ground", "", box_surface((2.6 * r, 2.6 * r, 2.6 * r)).with_pose(at), GROUND_COLOUR
+    )
 
 
 def spring_coil(start: Array, end: Array, widest: float) -> Array:

@@ -50,7 +50,7 @@ def render_page(stage: SceneGraph) -> str:
         server.scene.configure_default_lights(cast_shadow=False)
         _add_grid(server.scene, stage)
         for k in range(len(stage.times)):
-            animated_scene.to(k)
+            animated_scene.show_frame(k)
             if k + 1 < len(stage.times):
                 recorder.insert_sleep(_frame_pause(stage))
         text: str = recorder.as_html()
@@ -69,14 +69,14 @@ def _start_server() -> Iterator[Any]:
     try:
         import viser
     except ImportError as error:
-        raise missing_package_error("view", "a page to look at", error) from None
+        raise missing_package_error("view", "an animation page", error) from None
     try:
         with _silence_console():
             server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
     except OSError as error:
         raise EnvironmentFailure(
-            f"a page to look at: viser cannot listen on this machine ({error}); "
-            "a film needs no such thing: take a name ending in .gif or .png"
+            f"animation page: viser cannot open a port on this machine ({error}); "
+            "write a film or a strip of frames instead: use a name ending in .gif or .png"
         ) from None
     try:
         yield server
@@ -103,19 +103,21 @@ class _AnimatedScene:
 
     def __init__(self, scene: Any, stage: SceneGraph) -> None:
         self.scene, self.stage = scene, stage
-        self.same = _POSE_TOLERANCE * stage.size
+        self.pose_tolerance = _POSE_TOLERANCE * stage.size
         self.clock = scene.add_frame("/clock", show_axes=False)
         for name in stage.choices:  # hidden until selected
             offset = (0.0 if name == stage.choices[0] else _HIDDEN_DISTANCE, 0.0, 0.0)
             scene.add_frame(f"/{name}", show_axes=False, position=offset)
         self.frames = {
             owner: scene.add_frame(f"/{owner}", show_axes=False)
-            for owner in {**stage.poses, **stage.told}
+            for owner in {**stage.poses, **stage.labels}
         }
-        self.shown: dict[str, tuple[Array, Array]] = {}
+        self.shown_poses: dict[str, tuple[Array, Array]] = {}
         for solid in stage.solids:
             self._add(solid)
-        self.bent = [(bent, self._bend(bent)) for bent in stage.bent]
+        self.deforming_surfaces = [
+            (bent, self._add_deforming_surface(bent)) for bent in stage.deforming_surfaces
+        ]
         self.lines = [(line, self._draw(line)) for line in stage.lines]
 
     def _add(self, solid: Solid) -> None:
@@ -126,7 +128,7 @@ class _AnimatedScene:
             opacity=None if solid.opacity == 1 else solid.opacity, visible=not solid.hidden,
         )  # fmt: skip
 
-    def _bend(self, bent: DeformingSurface) -> Any:
+    def _add_deforming_surface(self, bent: DeformingSurface) -> Any:
         return self.scene.add_mesh_simple(
             f"/{bent.name}", vertices=bent.vertices[0].astype(np.float32),
             faces=bent.faces.astype(np.uint32), color=bent.colour,
@@ -138,12 +140,12 @@ class _AnimatedScene:
             thickness=line.width * self.stage.size / 1000,
         )  # fmt: skip
 
-    def to(self, k: int) -> None:
+    def show_frame(self, k: int) -> None:
         """Move the objects that moved to frame k."""
         self.clock.position = (float(k), 0.0, 0.0)
         for owner, pose in self.stage.poses.items():
             self._pose(owner, pose, min(k, len(pose.position) - 1))
-        for bent, handle in self.bent if k else ():
+        for bent, handle in self.deforming_surfaces if k else ():
             handle.vertices = bent.vertices[k].astype(np.float32)
         for line, handle in self.lines if k else ():
             if len(line.points) > 1:
@@ -151,9 +153,9 @@ class _AnimatedScene:
 
     def _pose(self, owner: str, pose: Poses, k: int) -> None:
         position, quaternion = pose.position[k], pose.quaternion[k]
-        shown_pose = self.shown.get(owner)
+        shown_pose = self.shown_poses.get(owner)
         frame = self.frames[owner]
-        if shown_pose is None or np.abs(position - shown_pose[0]).max() > self.same:
+        if shown_pose is None or np.abs(position - shown_pose[0]).max() > self.pose_tolerance:
             frame.position = tuple(position)
         else:
             position = shown_pose[0]
@@ -161,7 +163,7 @@ class _AnimatedScene:
             frame.wxyz = tuple(quaternion)
         else:
             quaternion = shown_pose[1]
-        self.shown[owner] = position, quaternion
+        self.shown_poses[owner] = position, quaternion
 
 
 def _line_segments(points: Array) -> Any:
@@ -206,7 +208,7 @@ def _page_data(stage: SceneGraph) -> dict[str, Any]:
             "name": label.name, "text": label.text, "anchor": [float(x) for x in label.anchor],
             "labels": label.labels, "values": _encode_floats(label.values),
         }
-        for owner, label in stage.told.items()
+        for owner, label in stage.labels.items()
     }  # fmt: skip
     return {
         "title": stage.title, "speed": stage.speed, "times": _encode_floats(stage.times),

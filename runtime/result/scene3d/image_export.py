@@ -126,7 +126,7 @@ def write_frames(shots: Sequence[Frame], folder: Path) -> Sequence[Path]:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise MstmmError(f'frames: "{folder}" cannot be made ({error.strerror})') from None
+        raise MstmmError(f'frames: "{folder}" cannot be created ({error.strerror})') from None
     figure, axis = _frame_figure(shots[0].flat)
     paths = []
     for k, shot in enumerate(shots, 1):
@@ -152,7 +152,7 @@ def _show_frame(axis: Any, shot: Frame) -> None:
 
 def _frame_title(title: str, stage: SceneGraph, k: int) -> str:
     quantity, unit = stage.clock
-    rate = "" if stage.speed == 1 or unit != "s" else f"   ({stage.speed:g} s in a second)"
+    rate = "" if stage.speed == 1 or unit != "s" else f"   (speed {stage.speed:g})"
     digits = stage.digits if unit == "s" else 0
     return f"{title}   {quantity} = {stage.times[k]:.{digits}f} {unit}{rate}"
 
@@ -180,7 +180,7 @@ def _ffmpeg_path() -> str:
             executable = import_module("imageio_ffmpeg").get_ffmpeg_exe()
         except ImportError:
             raise EnvironmentFailure(
-                "an MP4 needs the program ffmpeg, which is not on this machine; install it, or "
-                "pip install imageio-ffmpeg, or take a name ending in .gif"
+                "MP4 requires the program ffmpeg, which is not installed; install it, or pip "
+                "install imageio-ffmpeg, or use a name ending in .gif"
             ) from None
     return str(executable)

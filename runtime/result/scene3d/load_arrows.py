@@ -43,7 +43,7 @@ class _LoadHistory:
     load: Load
     force: Array
     moment: Array
-    places: list[Array]
+    positions: list[Array]
     pose: Poses
 
 
@@ -51,32 +51,38 @@ class LoadArrows:
     """Loads of a run at the frame times of a film; `size` (m) is that of the scene."""
 
     def __init__(self, run: Record, when: FrameTimes, size: float) -> None:
-        self.run, self.when, self.size = run, when, size
-        values = Values(run._observed)
-        self.seen = [self._one(load, k, values) for k, load in enumerate(run.model.scene.load)]
+        self.run, self.frame_times, self.size = run, when, size
+        values = Values(run._observations)
+        self.histories = [
+            self._load_history(load, k, values) for k, load in enumerate(run.model.scene.load)
+        ]
 
-    def _one(self, load: Load, number: int, values: Values) -> _LoadHistory:
+    def _load_history(self, load: Load, number: int, values: Values) -> _LoadHistory:
         numbers = values.system.loads[number]
         wrench = np.hstack(
             [inertial_components(values, number, x) for x in (numbers.force, numbers.moment)]
         )
-        wrench = self.when.straight(wrench[self.when.kept])
+        wrench = self.frame_times.interpolate_linear(wrench[self.frame_times.samples])
         beams = {beam.name for beam in self.run.model.scene.beam}
         at_root = load.on in beams and load.force_per_length is None
-        pose = self.when.poses(self.run, f"{load.on}.root" if at_root else load.on)
+        pose = self.frame_times.poses(self.run, f"{load.on}.root" if at_root else load.on)
         if load.at is not None:
-            points = values.load(number)[0][self.when.kept]
-            pose = replace(pose, position=self.when.smooth(points[:, 0:3], points[:, 3:6]))
+            points = values.load(number)[0][self.frame_times.samples]
+            pose = replace(
+                pose, position=self.frame_times.interpolate_hermite(points[:, 0:3], points[:, 3:6])
+            )
         positions = [pose.position]
         if (
             load.force_per_length is not None
-            and split_reference(load.on)[0] in self.run.model.flexible
+            and split_reference(load.on)[0] in self.run.model.flexible_bodies
         ):
-            positions = self._along(load, pose)
+            positions = self._points_along(load, pose)
         return _LoadHistory(load, wrench[:, :3], wrench[:, 3:], positions, pose)
 
-    def _along(self, load: Load, pose: Poses) -> list[Array]:
-        motion = flexible_geometry.motion_at(self.run, split_reference(load.on)[0], self.when, pose)
+    def _points_along(self, load: Load, pose: Poses) -> list[Array]:
+        motion = flexible_geometry.motion_at(
+            self.run, split_reference(load.on)[0], self.frame_times, pose
+        )
         first, last = load.span or (0.0, float(motion.shapes.length))
         return list(
             np.moveaxis(
@@ -86,36 +92,36 @@ class LoadArrows:
             )
         )
 
-    def bent(self) -> Iterator[DeformingSurface]:
+    def arrow_surfaces(self) -> Iterator[DeformingSurface]:
         """Arrows of forces and moments, all of one kind to one scale."""
-        max_force = max((_max_norm(history.force) for history in self.seen), default=0.0)
-        max_moment = max((_max_norm(history.moment) for history in self.seen), default=0.0)
+        max_force = max((_max_norm(history.force) for history in self.histories), default=0.0)
+        max_moment = max((_max_norm(history.moment) for history in self.histories), default=0.0)
         shaft_radius = _SHAFT_RADIUS * self.size
-        for history in self.seen:
+        for history in self.histories:
             if _max_norm(history.force) > 0:
-                scale = 1.0 if len(history.places) == 1 else _LINE_LOAD_SCALE
+                scale = 1.0 if len(history.positions) == 1 else _LINE_LOAD_SCALE
                 vector = scale * _FORCE_LENGTH * self.size / max_force * history.force
                 arrow_meshes = [
                     arrows.straight_arrows(position, vector, shaft_radius)
-                    for position in history.places
+                    for position in history.positions
                 ]
                 yield _joined_arrows(f"forces/{history.load.name}", arrow_meshes)
             if _max_norm(history.moment) > 0:
                 vector = _MOMENT_RADIUS * self.size / max_moment * history.moment
                 arrow_meshes = [
                     arrows.circular_arrows(position, vector, shaft_radius)
-                    for position in history.places
+                    for position in history.positions
                 ]
                 yield _joined_arrows(f"moments/{history.load.name}", arrow_meshes)
 
     def poses(self) -> Iterator[tuple[str, Poses]]:
         """Owners of the labels of loads on the page, with their poses."""
-        for history in self.seen:
+        for history in self.histories:
             yield f"loads/{history.load.name}", history.pose
 
-    def told(self) -> Iterator[tuple[str, ObjectLabel]]:
+    def label_texts(self) -> Iterator[tuple[str, ObjectLabel]]:
         """Labels of loads on the page."""
-        for history in self.seen:
+        for history in self.histories:
             numbers = [(f"force {x}", "N", v) for x, v in zip("xyz", history.force.T, strict=True)]
             numbers += [
                 (f"moment {x}", "N m", v) for x, v in zip("xyz", history.moment.T, strict=True)

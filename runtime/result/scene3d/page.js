@@ -104,7 +104,7 @@
     const pointer = { x: -1e6, y: -1e6 };
     addEventListener("pointermove", (e) => { pointer.x = e.clientX; pointer.y = e.clientY; });
     const [what, unit] = told.clock, digits = unit === "s" ? told.digits : 0;
-    const rate = told.speed === 1 || unit !== "s" ? "" : `, ${number(told.speed, 3)} s in a second`;
+    const rate = told.speed === 1 || unit !== "s" ? "" : `, speed ${number(told.speed, 3)}`;
     let last = null, ticks = 0;
     const tick = () => {
       requestAnimationFrame(tick);

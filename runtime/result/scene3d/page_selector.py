@@ -22,15 +22,22 @@ def combine_stages(title: str, parts: Sequence[Part]) -> SceneGraph:
         notes=tuple(notes),
         choices=tuple(name for name, _ in parts),
         poses=dict(_with_prefix((name, stage.poses) for name, stage in parts)),
-        told=dict(_with_prefix((name, stage.told) for name, stage in parts)),
+        labels=dict(_with_prefix((name, stage.labels) for name, stage in parts)),
         solids=tuple(
             _solid_with_prefix(name, item) for name, stage in parts for item in stage.solids
         ),
-        bent=tuple(_named_with_prefix(name, item) for name, stage in parts for item in stage.bent),
+        deforming_surfaces=tuple(
+            _named_with_prefix(name, item)
+            for name, stage in parts
+            for item in stage.deforming_surfaces
+        ),
         lines=tuple(
             _named_with_prefix(name, item) for name, stage in parts for item in stage.lines
         ),
     )
+
+
+NamedObject = TypeVar("NamedObject", DeformingSurface, Line)
 
 
 def _with_prefix(parts: Iterator[tuple[str, Mapping[str, T]]]) -> Iterator[tuple[str, T]]:
@@ -39,12 +46,9 @@ def _with_prefix(parts: Iterator[tuple[str, Mapping[str, T]]]) -> Iterator[tuple
             yield f"{name}/{owner}", value
 
 
-def _solid_with_prefix(name: str, one: Solid) -> Solid:
-    return replace(one, owner=f"{name}/{one.owner}")
+def _solid_with_prefix(name: str, solid: Solid) -> Solid:
+    return replace(solid, owner=f"{name}/{solid.owner}")
 
 
-Moving = TypeVar("Moving", DeformingSurface, Line)
-
-
-def _named_with_prefix(name: str, one: Moving) -> Moving:
-    return replace(one, name=f"{name}/{one.name}")
+def _named_with_prefix(name: str, named_object: NamedObject) -> NamedObject:
+    return replace(named_object, name=f"{name}/{named_object.name}")

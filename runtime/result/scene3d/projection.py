@@ -23,20 +23,20 @@ _PAPER, _FAINT = "#ffffff", "#d9dde2"
 class ProjectedFrame:
     """Parallel projection of a scene, so that lengths can be compared.
 
-    The camera and the window are those of `whole`, of which the scene may be a part.
+    The camera and the window are those of `full_scene`, of which the scene may be a part.
     """
 
     stage: SceneGraph
-    whole: SceneGraph | None = None
+    full_scene: SceneGraph | None = None
 
     @cached_property
     def camera(self) -> Camera:
-        return choose_camera(self.whole or self.stage)
+        return choose_camera(self.full_scene or self.stage)
 
     @cached_property
     def window(self) -> tuple[Array, Array]:
         """Least and largest (right, up) in m shown in all frames."""
-        plane_points = ((self.whole or self.stage).cloud @ self.camera.axes.T)[:, :2]
+        plane_points = ((self.full_scene or self.stage).cloud @ self.camera.axes.T)[:, :2]
         low, high = plane_points.min(axis=0), plane_points.max(axis=0)
         margin = 0.04 * max(float((high - low).max()), 1e-9)
         return low - margin, high + margin
@@ -60,7 +60,7 @@ class ProjectedFrame:
             )
         )  # fmt: skip
         for line in self.stage.lines:
-            points = line.at(k, len(self.stage.times)) @ self.camera.axes.T
+            points = line.points_at(k, len(self.stage.times)) @ self.camera.axes.T
             colour = tuple(c / 255 for c in line.colour)
             axis.add_collection(LineCollection([points[:, :2]], colors=[colour], linewidths=0.9))
         low, high = self.window
@@ -82,7 +82,7 @@ class ProjectedFrame:
 
     def _surfaces(self, k: int) -> Any:
         """Inertial vertices, faces, colour and opacity of everything in frame k."""
-        rotations = {owner: pose.at(k) for owner, pose in self.stage.poses.items()}
+        rotations = {owner: pose.pose_at(k) for owner, pose in self.stage.poses.items()}
         for solid in self.stage.solids:
             if not solid.hidden:
                 vertices = solid.surface.vertices
@@ -90,7 +90,7 @@ class ProjectedFrame:
                     position, axes = rotations[solid.owner]
                     vertices = position + vertices @ axes.T
                 yield vertices, solid.surface.faces, solid.colour, solid.opacity
-        for bent in self.stage.bent:
+        for bent in self.stage.deforming_surfaces:
             yield bent.vertices[k], bent.faces, bent.colour, 1.0
 
     def _facing(

@@ -66,57 +66,59 @@ class _SceneBuilder:
         drawn = len(self.scene.hinges) <= _MAX_HINGES
         self.hinges: Sequence[Hinge] = self.scene.hinges if drawn else ()
         owners = len(self.names) + len(self.hinges)
-        self.when = when or FrameTimes.of(run, owners, speed, most)
+        self.frame_times = when or FrameTimes.for_run(run, owners, speed, most)
         self.trails = tuple(trails)
         self.elastic = {body.name: body for body in self.scene.elastic if body.name in self.names}
-        run._observed.fetch(self.names)
-        self.poses = {f"bodies/{name}": self.when.poses(run, name) for name in self.names}
+        run._observations.fetch(self.names)
+        self.poses = {f"bodies/{name}": self.frame_times.poses(run, name) for name in self.names}
         self.size = self._size()
         self.radius = body_geometry.bar_radius(self.size, self.size)
-        self.acting = LoadArrows(run, self.when, self.size)
+        self.load_arrows = LoadArrows(run, self.frame_times, self.size)
         self.notes = () if drawn else (f"more than {_MAX_HINGES} hinges: they are not drawn",)
 
     def stage(self, title: str) -> SceneGraph:
         solids = [*self._shapes(), *self._rigid(), *self._joints(), *self._feet()]
-        self.poses |= dict(self.acting.poses())
+        self.poses |= dict(self.load_arrows.poses())
         scene_graph = SceneGraph(
-            title=title, times=self.when.times, speed=self.when.speed, up=self._up(),
-            poses=self.poses, solids=tuple(solids),
-            bent=(*self._bent(), *self.acting.bent()),
-            lines=(*self._coils(), *self._ways()),
-            told=dict([*self._told(), *self.acting.told()]), notes=self.notes,
+            title=title, times=self.frame_times.times, speed=self.frame_times.speed,
+            up=self._up_direction(), poses=self.poses, solids=tuple(solids),
+            deforming_surfaces=(*self._deforming_surfaces(), *self.load_arrows.arrow_surfaces()),
+            lines=(*self._coils(), *self._path_lines()),
+            labels=dict([*self._body_labels(), *self.load_arrows.label_texts()]), notes=self.notes,
         )  # fmt: skip
         gravity_objects = gravity_arrow(scene_graph, float(np.linalg.norm(self.scene.gravity)))
         if gravity_objects is None:
             return scene_graph
-        arrow, told = gravity_objects
+        arrow, label = gravity_objects
         return replace(
             scene_graph,
             solids=(*scene_graph.solids, arrow),
-            told={**scene_graph.told, arrow.owner: told},
+            labels={**scene_graph.labels, arrow.owner: label},
         )
 
     # --- geometry ---------------------------------------------------------------------------------
 
     def _size(self) -> float:
         """Diagonal (m) of the box that contains origins and ends of all bodies."""
-        frames = np.unique(np.linspace(0, len(self.when.times) - 1, _MAX_SIZE_SAMPLES).astype(int))
+        frames = np.unique(
+            np.linspace(0, len(self.frame_times.times) - 1, _MAX_SIZE_SAMPLES).astype(int)
+        )
         low, high = np.full(3, np.inf), np.full(3, -np.inf)
         for name, body in zip(self.names, self.skeleton.bodies, strict=True):
             pose = self.poses[f"bodies/{name}"]
             ends = np.array([(0.0, 0.0, 0.0), *(body.end_position(end) for end in body.ends)])
-            positions = Poses(pose.position[frames], pose.quaternion[frames]).of(ends)
+            positions = Poses(pose.position[frames], pose.quaternion[frames]).inertial_points(ends)
             if name in self.elastic:
-                positions = np.stack([trail[frames] for trail in self._ways_of(name)], axis=1)
+                positions = np.stack([trail[frames] for trail in self._end_paths(name)], axis=1)
             low = np.minimum(low, positions.min(axis=(0, 1)))
             high = np.maximum(high, positions.max(axis=(0, 1)))
-        for hinge in self._held():
+        for hinge in self._ground_hinges():
             position = np.array(hinge.position)
             low, high = np.minimum(low, position), np.maximum(high, position)
         size = float(np.linalg.norm(high - low)) if len(self.names) else 1.0
         return size if size > 0 else 1.0
 
-    def _up(self) -> Array:
+    def _up_direction(self) -> Array:
         gravity = np.array(self.scene.gravity)
         strength = float(np.linalg.norm(gravity))
         return -gravity / strength if strength > 0 else np.array([0.0, 0.0, 1.0])
@@ -125,7 +127,7 @@ class _SceneBuilder:
         return _BODY_COLOURS[self.names.index(name) % len(_BODY_COLOURS)]
 
     def _rigid(self) -> Iterator[Solid]:
-        flexible_bodies = self.run.model.flexible
+        flexible_bodies = self.run.model.flexible_bodies
         names_with_geometry = {
             name for name, body in flexible_bodies.items() if body.shapes or body.skin
         }
@@ -155,46 +157,48 @@ class _SceneBuilder:
             colour = _BODY_COLOURS[number % len(_BODY_COLOURS)]
             yield user_geometry.shape_solid(shape, position, axes, colour, saved_files)
 
-    def _bent(self) -> Iterator[DeformingSurface]:
+    def _deforming_surfaces(self) -> Iterator[DeformingSurface]:
         shaped = {shape.owner for shape in self.scene.shape}
-        for name, body in self.run.model.flexible.items():
+        for name, body in self.run.model.flexible_bodies.items():
             pose, colour = self.poses[f"bodies/{name}"], self._colour(name)
             if body.shapes is not None:
                 yield flexible_geometry.beam_tube(
-                    self.run, name, self.when, pose, self.size, colour
+                    self.run, name, self.frame_times, pose, self.size, colour
                 )
             elif body.skin is not None and name not in shaped:
                 r = 0.3 * self.radius
-                yield flexible_geometry.elastic_surface(self.run, name, self.when, pose, r, colour)
+                yield flexible_geometry.elastic_surface(
+                    self.run, name, self.frame_times, pose, r, colour
+                )
 
     def _joints(self) -> Iterator[Solid]:
         for hinge in self.hinges:
             surface = hinge_glyphs.hinge_glyph(hinge, _GLYPH_RADIUS_RATIO * self._girth(hinge))
             if surface is not None:
                 owner = f"hinges/{hinge.name}"
-                self.poses[owner] = self._axes_of(hinge)
+                self.poses[owner] = self._glyph_poses(hinge)
                 yield Solid(owner, "glyph", surface, hinge_glyphs.HINGE_COLOUR)
         for force in self.scene.bushing:
             owner = f"bushings/{force.name}"
             reference = force.from_ if split_reference(force.to)[0] == GROUND else force.to
-            self.poses[owner] = self.when.poses(self.run, reference)
+            self.poses[owner] = self.frame_times.poses(self.run, reference)
             r = _GLYPH_RADIUS_RATIO * self.radius
             yield Solid(
                 owner, "glyph", ellipsoid_surface((r, r, 0.6 * r), 10), hinge_glyphs.SPRING_COLOUR
             )
 
-    def _axes_of(self, hinge: Hinge) -> Poses:
+    def _glyph_poses(self, hinge: Hinge) -> Poses:
         """Poses of a glyph: at the outboard end; a sliding hinge's rail at the inboard end."""
-        outer = self.when.poses(self.run, hinge.outboard)
+        outer = self.frame_times.poses(self.run, hinge.outboard)
         if hinge.facts is None or hinge.facts.turns or not hinge.facts.slides:
             return outer
         if hinge.inboard_body == GROUND:
-            start = np.tile(np.array(hinge.position), (len(self.when.times), 1))
+            start = np.tile(np.array(hinge.position), (len(self.frame_times.times), 1))
         else:
-            start = self.when.poses(self.run, hinge.inboard).position
+            start = self.frame_times.poses(self.run, hinge.inboard).position
         return Poses(start, outer.quaternion)
 
-    def _held(self) -> Iterator[Hinge]:
+    def _ground_hinges(self) -> Iterator[Hinge]:
         """Hinges that attach a body to the ground."""
         for hinge in self.hinges:
             free = hinge.facts is not None and hinge.facts.free_body
@@ -211,7 +215,7 @@ class _SceneBuilder:
         return min(radii)
 
     def _feet(self) -> Iterator[Solid]:
-        radii_by_position = {hinge.position: self._girth(hinge) for hinge in self._held()}
+        radii_by_position = {hinge.position: self._girth(hinge) for hinge in self._ground_hinges()}
         for number, (at, girth) in enumerate(radii_by_position.items(), 1):
             foot = hinge_glyphs.ground_block(np.array(at), _FOOT_RADIUS_RATIO * girth)
             yield Solid(foot.owner, f"{number}", foot.surface, foot.colour)
@@ -220,56 +224,61 @@ class _SceneBuilder:
 
     def _coils(self) -> Iterator[Line]:
         for spring in self.scene.spring:
-            start, end = self._place(spring, spring.from_), self._place(spring, spring.to)
+            start, end = (
+                self._spring_end_path(spring, spring.from_),
+                self._spring_end_path(spring, spring.to),
+            )
             points = hinge_glyphs.spring_coil(start, end, _GLYPH_RADIUS_RATIO * self.radius)
             yield Line(f"springs/{spring.name}", points, hinge_glyphs.SPRING_COLOUR)
 
-    def _ways_of(self, name: str) -> list[Array]:
+    def _end_paths(self, name: str) -> list[Array]:
         """Paths (f, 3) of the ends of an elastic body, one array for each end."""
         ends = self.elastic[name].ends
-        return [self.when.poses(self.run, f"{name}.{end}").position for end in ends]
+        return [self.frame_times.poses(self.run, f"{name}.{end}").position for end in ends]
 
-    def _place(self, spring: Spring, reference: str) -> Array:
+    def _spring_end_path(self, spring: Spring, reference: str) -> Array:
         """Path (f, 3) of an end of a spring."""
         if split_reference(reference)[0] == GROUND:
-            return np.tile(np.array(spring.position), (len(self.when.times), 1))
-        return self.when.poses(self.run, reference).position
+            return np.tile(np.array(spring.position), (len(self.frame_times.times), 1))
+        return self.frame_times.poses(self.run, reference).position
 
-    def _ways(self) -> Iterator[Line]:
+    def _path_lines(self) -> Iterator[Line]:
         for reference in self.trails:
             if split_reference(reference)[0] == GROUND:
-                raise SceneError(f'trail of "{reference}": the ground does not move; name an end')
-            way = self.when.way(self.run, reference)
-            yield Line(f"trails/{reference}", way[None], _TRAIL_COLOUR, 2.0)
+                raise SceneError(
+                    f'trail of "{reference}": the ground does not move; give an end of a body'
+                )
+            path = self.frame_times.path(self.run, reference)
+            yield Line(f"trails/{reference}", path[None], _TRAIL_COLOUR, 2.0)
 
     def _centre(self, name: str, body: Body) -> Array:
         """Label position of a body, in its axes."""
-        flexible_body = self.run.model.flexible.get(name)
+        flexible_body = self.run.model.flexible_bodies.get(name)
         if flexible_body is None or not flexible_body.ports:
             return body_geometry.body_centre(body)
         return np.mean([port.position for port in flexible_body.ports.values()], axis=0)
 
     # --- labels of the page -----------------------------------------------------------------------
 
-    def _told(self) -> Iterator[tuple[str, ObjectLabel]]:
+    def _body_labels(self) -> Iterator[tuple[str, ObjectLabel]]:
         for name, body in zip(self.names, self.skeleton.bodies, strict=True):
             text = (
                 (f"mass {body.mass:g} kg",)
-                if name not in self.run.model.flexible
+                if name not in self.run.model.flexible_bodies
                 else ("flexible",)
             )
             pose = self.poses[f"bodies/{name}"]
             labels = (("x", "m"), ("y", "m"), ("z", "m"))
             centre = self._centre(name, body)
-            positions = pose.of(centre[None])[:, 0]
-            lines = (*text, "its mass centre is at" if body.mass else "its middle is at")
+            positions = pose.inertial_points(centre[None])[:, 0]
+            lines = (*text, "mass centre at" if body.mass else "centre at")
             yield f"bodies/{name}", ObjectLabel(name, lines, centre, labels, positions)
         for hinge in self.hinges:
             if f"hinges/{hinge.name}" in self.poses:
-                slots = self.run.layout(hinge.name)
-                q = self.run.coordinate(hinge.name)
+                slots = self.run.coordinate_info(hinge.name)
+                q = self.run.coordinates(hinge.name)
                 coordinates = tuple(zip(slots.q_names, slots.q_units, strict=True))
-                values = self.when.straight(q[self.when.kept])
+                values = self.frame_times.interpolate_linear(q[self.frame_times.samples])
                 yield (
                     f"hinges/{hinge.name}",
                     ObjectLabel(hinge.name, (hinge.type,), np.zeros(3), coordinates, values),

@@ -30,12 +30,12 @@ class Poses:
         ]  # fmt: skip
         return np.stack(rows, axis=1).reshape(-1, 3, 3)
 
-    def at(self, k: int) -> tuple[Array, Array]:
+    def pose_at(self, k: int) -> tuple[Array, Array]:
         """Position (3,) and axes (3, 3) at frame k."""
         pose = Poses(self.position[k : k + 1], self.quaternion[k : k + 1])
         return self.position[k], pose.rotation()[0]
 
-    def of(self, points: Array) -> Array:
+    def inertial_points(self, points: Array) -> Array:
         """Inertial positions (f, n, 3) of points (n, 3) fixed in the axes."""
         return self.position[:, None] + np.einsum("fij,nj->fni", self.rotation(), points)
 
@@ -75,7 +75,7 @@ class Line:
     colour: Colour
     width: float = 1.5
 
-    def at(self, k: int, moments: int) -> Array:
+    def points_at(self, k: int, moments: int) -> Array:
         """Line (m, 3) at frame k; of a trail, the part covered by then."""
         if len(self.points) > 1 or moments < 2:
             return self.points[min(k, len(self.points) - 1)]
@@ -103,7 +103,7 @@ class SceneGraph:
         speed: seconds of the run per second of a film.
         up: (3,) unit vector that points up in the picture.
         poses: owner -> its axes over the frames; "ground" has none.
-        told: owner -> its label on the page.
+        labels: owner -> its label on the page.
         notes: notes on the drawing for readers.
         clock: what the frame times are, and their unit.
         choices: prefixes of owners, of which one is shown at a time; if empty, all are.
@@ -115,9 +115,9 @@ class SceneGraph:
     up: Array
     poses: Mapping[str, Poses]
     solids: tuple[Solid, ...]
-    bent: tuple[DeformingSurface, ...]
+    deforming_surfaces: tuple[DeformingSurface, ...]
     lines: tuple[Line, ...]
-    told: Mapping[str, ObjectLabel]
+    labels: Mapping[str, ObjectLabel]
     notes: tuple[str, ...] = ()
     clock: tuple[str, str] = ("t", "s")
     choices: tuple[str, ...] = ()
@@ -127,18 +127,27 @@ class SceneGraph:
         scaled_poses = {owner: replace(pose, position=factor * pose.position)
                  for owner, pose in self.poses.items()}  # fmt: skip
         solids = tuple(replace(item, surface=item.surface.scaled(factor)) for item in self.solids)
-        bent = tuple(replace(item, vertices=factor * item.vertices) for item in self.bent)
+        bent = tuple(
+            replace(item, vertices=factor * item.vertices) for item in self.deforming_surfaces
+        )
         lines = tuple(replace(item, points=factor * item.points) for item in self.lines)
-        told = {
-            owner: replace(item, anchor=factor * item.anchor) for owner, item in self.told.items()
+        labels = {
+            owner: replace(item, anchor=factor * item.anchor) for owner, item in self.labels.items()
         }
-        return replace(self, poses=scaled_poses, solids=solids, bent=bent, lines=lines, told=told)
+        return replace(
+            self,
+            poses=scaled_poses,
+            solids=solids,
+            deforming_surfaces=bent,
+            lines=lines,
+            labels=labels,
+        )
 
     @cached_property
     def cloud(self) -> Array:
         """Inertial points (n, 3) that enclose everything that is drawn, over all frames."""
         clouds = [_sampled_points(line.points) for line in self.lines]
-        clouds += [_sampled_points(bent.vertices) for bent in self.bent]
+        clouds += [_sampled_points(bent.vertices) for bent in self.deforming_surfaces]
         for solid in self.solids:
             if not solid.hidden:
                 clouds.append(self._corners(solid))
@@ -148,7 +157,7 @@ class SceneGraph:
         low, high = solid.surface.vertices.min(axis=0), solid.surface.vertices.max(axis=0)
         corners = low + _UNIT_BOX_CORNERS * (high - low)
         pose = self.poses.get(solid.owner)
-        return corners if pose is None else _sampled_points(pose.of(corners))
+        return corners if pose is None else _sampled_points(pose.inertial_points(corners))
 
     def corners(self) -> tuple[Array, Array]:
         """Least and largest inertial coordinates (3,) of everything drawn, in all frames."""

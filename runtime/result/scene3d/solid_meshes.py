@@ -31,7 +31,7 @@ class Surface:
         """Surface scaled about the origin of its axes."""
         return replace(self, vertices=factor * self.vertices)
 
-    def placed(self, at: ArrayLike = (0.0, 0.0, 0.0), axes: ArrayLike | None = None) -> Surface:
+    def with_pose(self, at: ArrayLike = (0.0, 0.0, 0.0), axes: ArrayLike | None = None) -> Surface:
         """Surface rotated by `axes` (3, 3) and moved by `at` (3,)."""
         rotated = self.vertices if axes is None else self.vertices @ np.asarray(axes).T
         return replace(self, vertices=rotated + np.asarray(at))
@@ -102,7 +102,7 @@ def ellipsoid_surface(axes: ArrayLike, around: int = CORNERS_AROUND) -> Surface:
 def bar_surface(start: ArrayLike, end: ArrayLike, radius: float, around: int = 10) -> Surface:
     """Round bar from one point to another."""
     a, b = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
-    return cylinder_surface(radius, float(np.linalg.norm(b - a)), around).placed(
+    return cylinder_surface(radius, float(np.linalg.norm(b - a)), around).with_pose(
         (a + b) / 2, axes_along(b - a)
     )
 

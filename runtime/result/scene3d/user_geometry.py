@@ -34,10 +34,12 @@ def shape_solid(
 
     `kept`: contents of mesh files stored with the run, by path; others are read now.
     """
-    local_surface = _shape_surface(shape, kept).placed(shape.position, np.array(shape.rotation))
+    local_surface = _shape_surface(shape, kept).with_pose(shape.position, np.array(shape.rotation))
     owner = "ground" if shape.is_on_ground else f"bodies/{shape.owner}"
     colour = colour if shape.color is None else _parse_colour(shape.color)
-    return Solid(owner, shape.name, local_surface.placed(at, np.array(axes)), colour, shape.opacity)
+    return Solid(
+        owner, shape.name, local_surface.with_pose(at, np.array(axes)), colour, shape.opacity
+    )
 
 
 def _shape_surface(shape: Shape, kept: Mapping[str, bytes]) -> Surface:
@@ -71,7 +73,7 @@ def _read_mesh(shape: Shape, content: bytes | None) -> Surface:
         vertices, faces = np.array(mesh.vertices, dtype=float), np.array(mesh.faces)
     except Exception as error:  # readers raise many types for invalid files
         raise SceneError(
-            f'shape "{shape.name}": file "{path}" is no mesh that can be read '
+            f'shape "{shape.name}": file "{path}" is not a readable mesh '
             f"({type(error).__name__}: {error})"
         ) from None
     if not len(faces) or len(faces) > _MAX_TRIANGLES or not np.isfinite(vertices).all():

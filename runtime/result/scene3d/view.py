@@ -94,7 +94,7 @@ class SceneView(NotebookDisplay):
                 write_film(film_frames(self.parts, self.stage), film_path)
                 shutil.copyfile(film_path, part)
 
-    def picture(self, moments: int = 6) -> bytes:
+    def strip_png(self, moments: int = 6) -> bytes:
         """Strip as a PNG in memory, which stays small for complex scenes."""
         buffer = BytesIO()
         write_strip(strip_frames(self.parts, self.stage, moments), buffer, "png")
@@ -111,12 +111,7 @@ class SceneView(NotebookDisplay):
         )
 
 
-def make_view(
-    run: Record,
-    title: str,
-    trails: Sequence[str],
-    speed: float | None,
-) -> SceneView:
+def make_view(run: Record, title: str, trails: Sequence[str], speed: float | None) -> SceneView:
     """Create the view of a run; see `Result.view`."""
     trails = require_texts("trails", trails, "rod2.tip")
     title = optional_text("title", title) or ""

@@ -29,16 +29,16 @@ class AppliedLoads:
     """Expression values at all samples, computed on first use and cached."""
 
     def __init__(self, observed: Observations) -> None:
-        self.observed = observed
+        self.observations = observed
         self.system: System = observed.engine.packed.system
 
     @cached_property
-    def given(self) -> dict[str, Array]:
+    def expression_inputs(self) -> dict[str, Array]:
         """Values that expressions read: t, q, u and the inputs, held inputs from memory."""
-        run, held = self.observed.run, self.system.held
+        run, held = self.observations.run, self.system.held_inputs
         inputs = np.array([self.system.inputs_at(t) for t in run.t.tolist()])
         inputs = inputs.reshape(len(run.t), NUMBERS_PER_PIECE * len(self.system.inputs))
-        for k, slot in enumerate(held.places):
+        for k, slot in enumerate(held.memory_indices):
             if slot >= 0:
                 inputs[:, NUMBERS_PER_PIECE * k : NUMBERS_PER_PIECE * (k + 1)] = 0.0
                 inputs[:, NUMBERS_PER_PIECE * k + 1] = run.memory[:, slot]
@@ -48,7 +48,7 @@ class AppliedLoads:
     def _values(self) -> Array:
         kernel = self.system.values
         assert kernel is not None
-        return numpy_kernels.evaluate(kernel, self.given)["values"]
+        return numpy_kernels.evaluate(kernel, self.expression_inputs)["values"]
 
     @cached_property
     def _loads(self) -> Array | None:
@@ -57,14 +57,14 @@ class AppliedLoads:
         None if the array would be too large.
         """
         probes = [probe for number in range(len(self.system.loads)) for probe in self._pair(number)]
-        is_small = len(self.observed.run.t) * 24 * len(probes) <= MAX_MOTION_NUMBERS
-        return self._seen(probes) if is_small else None
+        is_small = len(self.observations.run.t) * 24 * len(probes) <= MAX_MOTION_NUMBERS
+        return self._observe(probes) if is_small else None
 
     def load(self, number: int) -> tuple[Array, Array]:
         """Motion (n, 24) of the point of a load and of its axes, see `Observation`."""
         motions, first = self._loads, 2 * number
         if motions is None:
-            motions, first = self._seen(self._pair(number)), 0
+            motions, first = self._observe(self._pair(number)), 0
         return motions[:, first], motions[:, first + 1]
 
     def _pair(self, number: int) -> tuple[Probe, Probe]:
@@ -74,14 +74,14 @@ class AppliedLoads:
             load.axes, axes, (0.0, 0.0, 0.0)
         )
 
-    def _seen(self, probes: Sequence[Probe]) -> Array:
-        run, engine = self.observed.run, self.observed.engine
+    def _observe(self, probes: Sequence[Probe]) -> Array:
+        run, engine = self.observations.run, self.observations.engine
         return engine.observe(run.t, run.q, run.u, run.memory, probes, ("points",)).points
 
-    def at(self, places: tuple[int, ...]) -> Array:
+    def values_at(self, indices: tuple[int, ...]) -> Array:
         """Values (n, places) at some indices, 0 at index -1."""
-        result = np.zeros((len(self.observed.run.t), len(places)))
-        for k, slot in enumerate(places):
+        result = np.zeros((len(self.observations.run.t), len(indices)))
+        for k, slot in enumerate(indices):
             if slot >= 0:
                 result[:, k] = self._values[:, slot]
         return result

@@ -26,10 +26,10 @@ if TYPE_CHECKING:
 #: Quantities of a bushing: loads in inertial axes, deflections in its own.
 BUSHING_QUANTITIES = {
     "force": QuantityKind("N", "force on the end `to`", XYZ, ("fx", "fy", "fz")),
-    "moment": QuantityKind("N*m", "moment on the end `to`, at its place", XYZ, ("mx", "my", "mz")),
-    "deflection": QuantityKind(
-        "m", "motion of the end `to` from its place at rest, own axes", XYZ, ()
+    "moment": QuantityKind(
+        "N*m", "moment on the end `to`, about its point", XYZ, ("mx", "my", "mz")
     ),
+    "deflection": QuantityKind("m", "displacement of the end `to` from rest, own axes", XYZ, ()),
     "turn": QuantityKind("rad", "rotation vector of the end `to` from rest, own axes", XYZ, ()),
 }
 
@@ -103,7 +103,7 @@ def _wrench_of_ends(ends: tuple[Array, Array], numbers: tuple[float, ...], eleme
                "w": POINT_COLUMNS["angular_velocity"]}  # fmt: skip
     for letter, end in zip("FT", ends, strict=True):
         inputs[f"A_{letter}"] = end[is_finite, 15:24].reshape(-1, 3, 3)
-        inputs |= {f"{name}_{letter}": end[is_finite, place] for name, place in columns.items()}
+        inputs |= {f"{name}_{letter}": end[is_finite, column] for name, column in columns.items()}
     outputs = numpy_kernels.evaluate(_wrench_kernel(element), inputs)
     loads = np.full((len(is_finite), 6), np.nan)
     loads[is_finite] = np.hstack([outputs["F"], outputs["M"]])

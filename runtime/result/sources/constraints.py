@@ -22,33 +22,35 @@ if TYPE_CHECKING:
 _FORCE = QuantityKind("N", "force on the end `to`", XYZ, ())
 
 
-def add_constraint(table: Table, observed: Observations, one: Constraint) -> None:
+def add_constraint(table: Table, observed: Observations, constraint: Constraint) -> None:
     """Add the quantities of a constraint: rod.force, rod.load, road.friction, wire.s."""
-    name, owner = one.name, f"constraint {one.name}"
+    name, owner = constraint.name, f"constraint {constraint.name}"
 
     def force() -> Array:
-        return _constraint_force(observed, one)
+        return _constraint_force(observed, constraint)
 
     def load() -> Array:
-        return np.asarray(np.einsum("ni,ni->n", force(), _load_direction(observed, one)))
+        return np.asarray(np.einsum("ni,ni->n", force(), _load_direction(observed, constraint)))
 
     def friction() -> Array:
-        normal_force = load()[:, None] * _load_direction(observed, one)
+        normal_force = load()[:, None] * _load_direction(observed, constraint)
         return np.asarray(np.linalg.norm(force() - normal_force, axis=1))
 
     table.vector(f"{name}.force", owner, _FORCE, force)
-    if one.type == CURVE:
+    if constraint.type == CURVE:
         packed = observed.engine.packed
-        column = int(packed.system.places["q"][packed.hinge_position[_frame_hinge_name(one)]])
+        column = int(
+            packed.system.first_indices["q"][packed.hinge_position[_frame_hinge_name(constraint)]]
+        )
         table.scalar(
             f"{name}.s", "", "parameter of the curve", lambda: observed.run.q[:, column],
             owner=owner,
         )  # fmt: skip
         return
-    meaning = "which pushes the ends apart" if one.type == DISTANCE else "along the normal"
+    meaning = "which pushes the ends apart" if constraint.type == DISTANCE else "along the normal"
     table.scalar(f"{name}.load", "N", f"load, {meaning},", load, owner=owner)
-    if one.type == ROLLING:
-        table.scalar(f"{name}.friction", "N", "friction against slip", friction, owner=owner)
+    if constraint.type == ROLLING:
+        table.scalar(f"{name}.friction", "N", "friction force", friction, owner=owner)
 
 
 def add_coupling(table: Table, observed: Observations, name: str) -> None:
@@ -60,33 +62,37 @@ def add_coupling(table: Table, observed: Observations, name: str) -> None:
         row_loads = observed.part("rows")
         return -row_loads[:, rows[0]] if rows else np.zeros(len(row_loads))
 
-    meaning = "load, by the slopes of its expression,"
+    meaning = "load per derivative of its expression,"
     table.scalar(f"{name}.load", "", meaning, load, owner=f"coupling {name}")
 
 
-def _frame_hinge_name(one: Constraint) -> str:
-    return one.name + OF_CONSTRAINT
+def _frame_hinge_name(constraint: Constraint) -> str:
+    return constraint.name + OF_CONSTRAINT
 
 
-def _constraint_force(observed: Observations, one: Constraint) -> Array:
+def _constraint_force(observed: Observations, constraint: Constraint) -> Array:
     """Constraint force (n, 3), inertial axes."""
-    hinge_index = observed.engine.packed.hinge_position[_frame_hinge_name(one)]
+    hinge_index = observed.engine.packed.hinge_position[_frame_hinge_name(constraint)]
     return observed.columns("loads", (hinge_index, slice(0, 3)))
 
 
-def _load_direction(observed: Observations, one: Constraint) -> Array:
+def _load_direction(observed: Observations, constraint: Constraint) -> Array:
     """Direction (n, 3) of the load, inertial axes: for a distance from `from` to `to`."""
-    if one.type == DISTANCE:
-        difference = _end_position(observed, one, one.to) - _end_position(observed, one, one.from_)
+    if constraint.type == DISTANCE:
+        difference = _end_position(observed, constraint, constraint.to) - _end_position(
+            observed, constraint, constraint.from_
+        )
         return np.asarray(difference / np.linalg.norm(difference, axis=1)[:, None])
-    normal = one.unit_normal
+    normal = constraint.unit_normal
     assert normal is not None
-    if one.from_ == GROUND:
+    if constraint.from_ == GROUND:
         return np.tile(np.asarray(normal), (len(observed.run.t), 1))
-    return np.asarray(observed.points(one.from_)[:, 15:24].reshape(-1, 3, 3) @ np.asarray(normal))
+    return np.asarray(
+        observed.points(constraint.from_)[:, 15:24].reshape(-1, 3, 3) @ np.asarray(normal)
+    )
 
 
-def _end_position(observed: Observations, one: Constraint, end: str) -> Array:
+def _end_position(observed: Observations, constraint: Constraint, end: str) -> Array:
     if end == GROUND:
-        return np.tile(np.asarray(one.position), (len(observed.run.t), 1))
+        return np.tile(np.asarray(constraint.position), (len(observed.run.t), 1))
     return observed.points(end)[:, :3]

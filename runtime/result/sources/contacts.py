@@ -28,8 +28,8 @@ _LOAD_ROUNDING, _ENERGY_ROUNDING = 1e-6, 1e-9
 _NORMAL_ROW = "normal"
 
 _REMEDY = (
-    "use the run up to there; what may lift off needs a stop that pushes alone (law.limits with a "
-    "stiffness)"
+    "use the run up to this time, or model the contact by a stop, which can lift off (law.limits "
+    "with a stiffness)"
 )
 
 
@@ -40,9 +40,9 @@ def find_pulling_contacts(result: Record) -> Iterator[Risk]:
     """
     model = result.model
     rolling = [constraint for constraint in model.scene.constraint if constraint.type == ROLLING]
-    if not rolling or model.closed is None or not len(result.t):
+    if not rolling or model.loop_start is None or not len(result.t):
         return
-    shares = model.closed.loops.not_unique
+    shares = model.loop_start.loops.indeterminate_reactions
     is_open = {
         constraint.name: _NORMAL_ROW in shares.get(constraint.name, ()) for constraint in rolling
     }
@@ -61,18 +61,18 @@ def find_pulling_contacts(result: Record) -> Iterator[Risk]:
         else:
             yield from _pulling_risk(
                 result.t, constraint.name, loads[constraint.name], bound,
-                "its normal load, one of many shares that rigid bodies leave open,", False,
+                "its normal load, indeterminate for rigid bodies,", False,
             )  # fmt: skip
 
 
-def _load_rounding(result: Record, one: Constraint, loads: dict[str, Array]) -> float:
+def _load_rounding(result: Record, constraint: Constraint, loads: dict[str, Array]) -> float:
     """Largest load (N) that is rounding."""
     energy = result.quantity("energy.kinetic").values
     largest = max(float(np.nanmax(np.abs(load), initial=0.0)) for load in loads.values())
-    assert one.radius is not None
+    assert constraint.radius is not None
     return (
         _LOAD_ROUNDING * largest
-        + _ENERGY_ROUNDING * float(np.nanmax(energy, initial=0.0)) / one.radius
+        + _ENERGY_ROUNDING * float(np.nanmax(energy, initial=0.0)) / constraint.radius
     )
 
 
@@ -87,7 +87,7 @@ def _pulling_risk(
     first, worst = int(np.argmax(pulls)), int(np.nanargmin(load))
     yield Risk(
         "pulling-contact", f'constraint "{name}"',
-        f'constraint "{name}" pulls from t = {t[first]:.6g} s on, where a contact would lift off: '
-        f"{what} falls to {load[worst]:.3g} N at t = {t[worst]:.6g} s", _REMEDY,
+        f'constraint "{name}" is in tension from t = {t[first]:.6g} s on, where a contact would '
+        f"lift off: {what} falls to {load[worst]:.3g} N at t = {t[worst]:.6g} s", _REMEDY,
         float(load[worst]), 0.0, "N", doubt,
     )  # fmt: skip

@@ -54,9 +54,8 @@ def gimbal_note(angles: Array) -> str:
     worst = int(near_samples[np.argmin(cos_pitch[near_samples])])
     offset_deg = np.degrees(np.arccos(min(1.0, float(np.sin(abs(angles[worst, 1]))))))
     return (
-        f"pitch comes within {offset_deg:.2g} deg of 90 deg (sample {worst}): yaw and roll swing "
-        f"there, "
-        "whatever the motion; take the orientation instead"
+        f"pitch comes within {offset_deg:.2g} deg of 90 deg (sample {worst}): yaw and roll "
+        "are ill-conditioned there; use the orientation instead"
     )
 
 

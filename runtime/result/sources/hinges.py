@@ -29,7 +29,7 @@ from .euler_angles import EULER_KIND, euler_angles, gimbal_note, rotation_matric
 
 def add_hinge(table: Table, acting: AppliedLoads, hinge: HingeSlots) -> None:
     """Add the quantities of a hinge by name and by index: shoulder.angle, shoulder.q[0]."""
-    observed, owner = acting.observed, f"hinge {hinge.name}"
+    observed, owner = acting.observations, f"hinge {hinge.name}"
     group = _add_motion(table, acting, hinge, owner)
     units = [effort_unit(unit) for unit in hinge.u_units]
 
@@ -55,14 +55,14 @@ def add_hinge(table: Table, acting: AppliedLoads, hinge: HingeSlots) -> None:
 
 def _add_powers(table: Table, acting: AppliedLoads, hinge: HingeSlots, efforts: Values) -> None:
     """Add the power of all efforts along the speeds, and the inputs of drives and `law.effort`."""
-    owner, run = f"hinge {hinge.name}", acting.observed.run
+    owner, run = f"hinge {hinge.name}", acting.observations.run
 
     def power(of: Values) -> Array:
         return np.asarray(np.sum(of() * run.u[:, hinge.u_slice], axis=1))
 
     name = f"{hinge.name}.power"
     table.scalar(name, "W", "power of the effort", partial(power, efforts), owner=owner)
-    hinge_index = acting.observed.engine.packed.hinge_position[hinge.name]
+    hinge_index = acting.observations.engine.packed.hinge_position[hinge.name]
     driven_speeds = [k for body, k in acting.system.driven if body == hinge_index]
     slots = effort_slots(acting.system, hinge_index, hinge.nu)
     motor_speeds = [k for k in range(hinge.nu) if k in driven_speeds or slots[k] >= 0]
@@ -70,7 +70,7 @@ def _add_powers(table: Table, acting: AppliedLoads, hinge: HingeSlots, efforts: 
         return
 
     def motor() -> Array:
-        motor_efforts = acting.at(slots)
+        motor_efforts = acting.values_at(slots)
         motor_efforts[:, driven_speeds] = efforts()[:, driven_speeds]
         return motor_efforts
 
@@ -88,7 +88,7 @@ def effort_slots(system: System, body: int, count: int) -> tuple[int, ...]:
     """Indices of the given efforts of laws among the values, speed by speed; -1 for none."""
     slots = [-1] * count
     for run in system.laws:
-        repeat, member = divmod(body - run.place, run.period)
+        repeat, member = divmod(body - run.position, run.period)
         for position, law in enumerate(run.pattern):
             row = repeat * len(run.pattern) + position
             if law.member == member and 0 <= row < run.count:
@@ -106,7 +106,7 @@ def _add_motion(
     table: Table, acting: AppliedLoads, slots: HingeSlots, owner: str, straight: bool = False
 ) -> _Group:
     """Add q, u and udot of a hinge or of modes."""
-    run, group = acting.observed.run, _Group(table, slots.name, owner)
+    run, group = acting.observations.run, _Group(table, slots.name, owner)
     rates = [rate_unit(unit) for unit in slots.u_units]
     accelerations = [acceleration_name(name) for name in slots.u_names]
 
@@ -114,10 +114,10 @@ def _add_motion(
         return run.u[:, slots.u_slice]
 
     def udot() -> Array:
-        return acting.observed.columns("udot", (slots.u_slice,))
+        return acting.observations.columns("udot", (slots.u_slice,))
 
     group.add("q", slots.q_names, slots.q_units, lambda: run.q[:, slots.q_slice],
-              speeds if straight or slots.straight else None)  # fmt: skip
+              speeds if straight or slots.rates_are_speeds else None)  # fmt: skip
     group.add("u", slots.u_names, slots.u_units, speeds, udot)
     group.add("udot", accelerations, rates, udot)
     return group

@@ -39,14 +39,14 @@ def add_load(table: Table, acting: AppliedLoads, load: Load, number: int) -> Non
         return np.asarray(force_power + moment_power)
 
     table.vector(f"{load.name}.force", owner, LOAD_QUANTITIES["force"], force, base=load.name)
-    if any(place >= 0 for place in numbers.moment):
+    if any(index >= 0 for index in numbers.moment):
         table.vector(
             f"{load.name}.moment", owner, LOAD_QUANTITIES["moment"], moment, base=load.name
         )
     table.scalar(f"{load.name}.power", "W", "power", power, owner=owner)
 
 
-def inertial_components(acting: AppliedLoads, number: int, places: tuple[int, ...]) -> Array:
-    """Inertial components (n, 3) of the three values of a load at `places`."""
+def inertial_components(acting: AppliedLoads, number: int, indices: tuple[int, ...]) -> Array:
+    """Inertial components (n, 3) of the three values of a load at `indices`."""
     axes = acting.load(number)[1][:, 15:24].reshape(-1, 3, 3)
-    return np.einsum("nij,nj->ni", axes, acting.at(places))
+    return np.einsum("nij,nj->ni", axes, acting.values_at(indices))

@@ -45,13 +45,13 @@ class SampledVariable:
 
 
 def sampled_variables(
-    model: CompiledScene, states: RunStates, one: ActiveExpression, own: Hinge | None
+    model: CompiledScene, states: RunStates, active: ActiveExpression, own: Hinge | None
 ) -> dict[str, SampledVariable] | None:
     """Variables of an expression along a run, by name; None if one of them is unknown."""
-    constants = dict(one.constants)
-    length = None if one.spring is None else _spring_length(model, states, one)
+    constants = dict(active.constants)
+    length = None if active.spring is None else _spring_length(model, states, active)
     variables = dict[str, SampledVariable]()
-    for name in one.expression.names:
+    for name in active.expression.names:
         if name.text in constants or (own is not None and name.text in own.parameters):
             continue
         course = _sampled_variable(model, states, name, own, length)
@@ -70,20 +70,20 @@ def _sampled_variable(
 ) -> SampledVariable | None:
     if name.text == TIME:
         return SampledVariable(states.t, np.ones(len(states.t)))
-    if name.text in model.packed.channels:
+    if name.text in model.packed_scene.channels:
         return _sampled_input(model, states, name.text)
     if length is not None and name.text in ("q", "u"):
         return length if name.text == "q" else _with_parabola_rates(states.t, length.rates)
     hinge = name.hinge or ("" if own is None else own.name)
     if name.quantity not in ("q", "u") or not hinge:
         return None
-    slots, index = model.layout.hinges[hinge], name.index or 0
+    slots, index = model.coordinate_layout.hinges[hinge], name.index or 0
     if name.quantity == "u":
         return _with_parabola_rates(states.t, states.u[:, slots.u + index])
     values = states.q[:, slots.q + index]
     return (
         SampledVariable(values, states.u[:, slots.u + index])
-        if slots.straight
+        if slots.rates_are_speeds
         else _with_parabola_rates(states.t, values)
     )
 
@@ -97,18 +97,20 @@ def _with_parabola_rates(t: Array, values: Array) -> SampledVariable:
 
 def _sampled_input(model: CompiledScene, states: RunStates, name: str) -> SampledVariable:
     """Input or signal along a run; a held input is constant in every step."""
-    slot = model.packed.system.held.places[list(model.packed.channels).index(name)]
+    slot = model.packed_scene.system.held_inputs.memory_indices[
+        list(model.packed_scene.channels).index(name)
+    ]
     if slot >= 0:
         return SampledVariable(states.memory[:, slot], np.zeros(len(states.t)))
-    channel = model.packed.channels[name]
+    channel = model.packed_scene.channels[name]
     return _with_parabola_rates(states.t, np.array([channel.value(t) for t in states.t.tolist()]))
 
 
 def _spring_length(
-    model: CompiledScene, states: RunStates, one: ActiveExpression
+    model: CompiledScene, states: RunStates, active: ActiveExpression
 ) -> SampledVariable:
     """Length of the spring of an expression (m) and its rate (m/s)."""
-    engine, spring = model.looped, one.spring
+    engine, spring = model.looped, active.spring
     assert spring is not None
     probes = []
     for reference in (spring.from_, spring.to):

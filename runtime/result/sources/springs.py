@@ -58,25 +58,25 @@ def spring_effort(acting: AppliedLoads, spring: Spring) -> Array:
     """Effort (n,) in N. SceneError for a user-defined element, whose law is unknown here."""
     if spring.type != "spring":
         raise SceneError(
-            f'"{spring.name}.effort": the law of a force element "{spring.type}" is not known to '
-            f"results; there are {spring.name}.length and {spring.name}.length_rate"
+            f'"{spring.name}.effort": the law of a force element "{spring.type}" is not '
+            f"available; use {spring.name}.length and {spring.name}.length_rate"
         )
     law = spring.law
-    length, rate = spring_motion(acting.observed, spring)
+    length, rate = spring_motion(acting.observations, spring)
     return motor_effort(acting, spring) - law.stiffness * (length - law.rest) - law.damping * rate
 
 
 def motor_effort(acting: AppliedLoads, spring: Spring) -> Array:
     """Effort (n,) in N of `law.effort`."""
-    scene = acting.observed.engine.packed.scene
+    scene = acting.observations.engine.packed.scene
     number = next(
         k for k, spring_of_scene in enumerate(scene.spring) if spring_of_scene.name == spring.name
     )
     kernel = acting.system.forces[number].effort
     if kernel is None:
-        return np.zeros(len(acting.observed.run.t))
-    length = np.stack(spring_motion(acting.observed, spring), axis=1)
-    outputs = numpy_kernels.evaluate(kernel, acting.given | {"length": length})
+        return np.zeros(len(acting.observations.run.t))
+    length = np.stack(spring_motion(acting.observations, spring), axis=1)
+    outputs = numpy_kernels.evaluate(kernel, acting.expression_inputs | {"length": length})
     return np.asarray(outputs["values"][:, 0])
 
 
@@ -90,7 +90,11 @@ def _spring_direction(observed: Observations, spring: Spring) -> Array:
 
 def add_spring(table: Table, acting: AppliedLoads, spring: Spring) -> None:
     """Add the quantities of a spring: strut.length, strut.effort, strut.force, strut.power."""
-    observed, owner, built_in = acting.observed, f"spring {spring.name}", spring.type == "spring"
+    observed, owner, built_in = (
+        acting.observations,
+        f"spring {spring.name}",
+        spring.type == "spring",
+    )
     cached_motion = cache(lambda: spring_motion(observed, spring))
     get: dict[str, Values] = {
         "length": lambda: cached_motion()[0],
@@ -112,20 +116,22 @@ def add_spring(table: Table, acting: AppliedLoads, spring: Spring) -> None:
     if not built_in:
         return
 
-    def powered(of: Values) -> Values:
+    def power_getter(of: Values) -> Values:
         return lambda: np.asarray(of() * get["length_rate"]())
 
     def force() -> Array:
         return np.asarray(get["effort"]()[:, None] * _spring_direction(observed, spring))
 
-    power = powered(get["effort"])
+    power = power_getter(get["effort"])
     table.vector(f"{spring.name}.force", owner, _FORCE, force, base=spring.name)
     table.scalar(f"{spring.name}.power", "W", "power of the effort", power, owner=owner)
     if not spring.law.effort.is_zero:
         motor_values: Values = lambda: motor_effort(acting, spring)  # noqa: E731
         name = f"{spring.name}.motor"
         table.scalar(name, "N", "motor effort", motor_values, owner=owner)
-        table.scalar(f"{name}_power", "W", "power of the motor", powered(motor_values), owner=owner)
+        table.scalar(
+            f"{name}_power", "W", "power of the motor", power_getter(motor_values), owner=owner
+        )
 
 
 def _end_state(observed: Observations, spring: Spring, end: str) -> Array:

@@ -34,13 +34,19 @@ class BatchInputs:
     def model(self, model: CompiledScene, k: int) -> CompiledScene:
         """Model with the inputs of trajectory k."""
         return (
-            model.renewed(with_input_pieces(model.packed, self.rows[k])) if self.rows[k] else model
+            model.with_packed_scene(with_input_pieces(model.packed_scene, self.rows[k]))
+            if self.rows[k]
+            else model
         )
 
-    def timed(self, model: CompiledScene) -> CompiledScene:
+    def with_times(self, model: CompiledScene) -> CompiledScene:
         """Model with the time-dependent inputs, whose breaks end steps in all trajectories."""
         varying = {name: signal for name, signal in self.rows[0].items() if signal.varies}
-        return model.renewed(with_input_pieces(model.packed, varying)) if varying else model
+        return (
+            model.with_packed_scene(with_input_pieces(model.packed_scene, varying))
+            if varying
+            else model
+        )
 
     def moves_breaks(self, model: CompiledScene) -> bool:
         """True if constant inputs determine when an expression of time switches or is narrow."""
@@ -57,7 +63,7 @@ class BatchInputs:
 def _feature_count(active: Any, constants: dict[str, float]) -> int:
     """Number of switches and narrow features of an active expression of time."""
     functions = ExpressionFunctions(active.expression, constants, active.drive)
-    return len(functions.margins()) + len(functions.watched())
+    return len(functions.margins()) + len(functions.narrow_candidates())
 
 
 def batch_inputs(
@@ -102,8 +108,8 @@ def _reject_drives(model: CompiledScene, given: Mapping[str, Any]) -> None:
         names = [name for name in active.inputs if active.drive and name in given]
         if names:
             raise SceneError(
-                f'inputs["{names[0]}"]: the {active.what} follows this input, expected an input '
-                f'that prescribes no motion; use parameters={{"{names[0]}.value": ...}}'
+                f'inputs["{names[0]}"]: the {active.description} follows this input, expected an '
+                f'input that prescribes no motion; use parameters={{"{names[0]}.value": ...}}'
             )
 
 

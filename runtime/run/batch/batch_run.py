@@ -60,11 +60,11 @@ class BatchModels:
     """Models of the runs, with their parameters and inputs."""
 
     models: tuple[CompiledScene, ...]
-    given: BatchInputs
+    inputs: BatchInputs
 
-    def of(self, k: int) -> CompiledScene:
+    def model_of_run(self, k: int) -> CompiledScene:
         """Model of run k."""
-        return self.given.model(self.models[k], k)
+        return self.inputs.model(self.models[k], k)
 
 
 @dataclass(frozen=True)
@@ -141,10 +141,10 @@ def simulate_batch(
         np.full((n, len(times), model.nq + model.nu), np.nan), np.zeros(n, dtype=bool),
         [str(m) if isinstance(m, MstmmError) else "" for m in made],
         np.zeros(n, dtype=np.int64), [()] * n,
-        np.full((n, len(times), model.packed.system.n_memory), np.nan),
+        np.full((n, len(times), model.packed_scene.system.n_memory), np.nan),
     )  # fmt: skip
     same_times = _has_same_times(model, models, settings)
-    closes = model.packed.system.closes  # loops are closed with the parameters of `model`
+    closes = model.packed_scene.system.has_loops  # loops are closed with the parameters of `model`
     in_lanes = np.array([library is not None and same_times[id(m)] and m.fusion.lanes is library
                          and (m is model or not closes) for m in models], bool)  # fmt: skip
     in_lanes &= ~failed
@@ -211,7 +211,7 @@ def _has_same_times(
     """
 
     def times(m: CompiledScene) -> list[list[float]]:
-        time_map = m.packed.time_map(settings.t_start, settings.t_end)
+        time_map = m.packed_scene.time_map(settings.t_start, settings.t_end)
         return [time_map.breaks.tolist(), time_map.starts.tolist(), time_map.longest.tolist()]
 
     expressions = active_expressions(model.scene)
@@ -223,10 +223,10 @@ def _has_same_times(
 
 def _lane_library(model: CompiledScene) -> FusedLibrary | None:
     """Fused code for SIMD lanes; None for scenes whose trajectories cannot run in lanes."""
-    packed = model.packed
+    packed = model.packed_scene
     if has_switches(packed.scene):
         return None
-    if packed.system.remembers or packed.scene.events or packed.system.driven:
+    if packed.system.uses_memory or packed.scene.events or packed.system.driven:
         return None
     return model.fusion.ready_lanes(math.inf)
 
@@ -236,14 +236,16 @@ def _run_in_lanes(
     given_inputs: BatchInputs, settings: Settings, q: Array, u: Array, rows: NDArray[np.int64],
     arrays: _BatchArrays, threads: int,
 ) -> None:  # fmt: skip
-    engine = given_inputs.timed(model).looped
-    code = _sequential_code(model, settings) if model.packed.system.closes else None
+    engine = given_inputs.with_times(model).looped
+    code = _sequential_code(model, settings) if model.packed_scene.system.has_loops else None
     systems = [SceneSystem(engine, code, with_power=False) for _ in range(threads)]
     start = np.ascontiguousarray(np.concatenate([q[rows], u[rows]], axis=1))
     start_times = np.full(len(start), settings.t_start)
     start, _ = project_samples(systems[0], start_times, start, np.zeros((len(start), 1)))
     numbers = np.ascontiguousarray([models[i].fusion.numbers for i in rows])
-    channels = [list((models[i].packed.channels | given_inputs.rows[i]).values()) for i in rows]
+    channels = [
+        list((models[i].packed_scene.channels | given_inputs.rows[i]).values()) for i in rows
+    ]
     lane_inputs = LaneInputs(engine, model.fusion.inputs, channels, numbers)
     lanes = Lanes(engine, library, settings, systems, numbers, model.nq + model.nu, lane_inputs)
     samples, outcomes = run_lanes(lanes, start)
@@ -276,7 +278,7 @@ def _lane_message(
     failure = Failure(status, float(outcome.fail_time), component, None, int(outcome.code))
     unknown_cause = status in (Status.NOT_FINITE, Status.ACCEPT_FAILED)
     hint = "simulate this trajectory alone to find the cause" if unknown_cause else ""
-    if status is Status.POLE and (pole := model.packed.time_map(*span).pole):
+    if status is Status.POLE and (pole := model.packed_scene.time_map(*span).pole):
         hint = pole[1]
     return failure_text(failure, system.components(), cause=hint) + last
 
@@ -335,7 +337,7 @@ def _run_trajectory(
     arrays.memory[i, columns] = result.memory
     arrays.success[i], arrays.messages[i] = result.success, result.message
     arrays.evaluations[i] = result.statistics.evaluations
-    arrays.methods[i] = () if choice is None else tuple(choice.stretches)
+    arrays.methods[i] = () if choice is None else tuple(choice.segments)
 
 
 def prepare_batch(

@@ -13,7 +13,7 @@ from mstmm.array_validation import Array
 from mstmm.errors import SceneError
 from mstmm.numerics.piecewise_polynomial import PiecewisePolynomial
 
-from ...engine.live_inputs import LiveInputs, Places
+from ...engine.live_inputs import IndexPairs, LiveInputs
 from ...engine.looped_engine import LoopedEngine
 from ...integrate.c_loop import Status
 from ...integrate.c_tableau import c_tableau
@@ -36,30 +36,30 @@ class LaneInputs:
     def __init__(
         self,
         engine: LoopedEngine,
-        read: Places,
+        read: IndexPairs,
         channels: Sequence[Sequence[PiecewisePolynomial]],
         numbers: Array,
     ) -> None:
-        places = LiveInputs(engine.packed.system, read).places
+        places = LiveInputs(engine.packed.system, read).indices
         self.memory = Memory(engine.ffi)
-        self.moving = [
+        self.varying = [
             k for k, row in enumerate(places)
             if (row >= 0).any() and any(channel[k].varies for channel in channels)
         ]  # fmt: skip
         for k, row in enumerate(places):
             is_read = row >= 0
-            if is_read.any() and k not in self.moving:
+            if is_read.any() and k not in self.varying:
                 numbers[:, row[is_read]] = [
-                    np.array(channel[k].at(0.0))[is_read] for channel in channels
+                    np.array(channel[k].piece_at(0.0))[is_read] for channel in channels
                 ]
-        self.places = np.ascontiguousarray(places[self.moving])
-        varying = [channel[k] for channel in channels for k in self.moving]
+        self.indices = np.ascontiguousarray(places[self.varying])
+        varying = [channel[k] for channel in channels for k in self.varying]
         self.records = write_inputs(varying, [-1] * len(varying), self.memory)
 
     def fill(self, view: Any, ffi: Any) -> None:
         """Write the varying inputs to a `mstmm_scene_lanes`."""
-        view.live.n, view.live.inputs = len(self.moving), self.records
-        view.live.places = ffi.from_buffer("int[]", self.places)
+        view.live.n, view.live.inputs = len(self.varying), self.records
+        view.live.places = ffi.from_buffer("int[]", self.indices)
 
 
 @dataclass

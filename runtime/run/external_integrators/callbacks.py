@@ -36,9 +36,7 @@ class Equations:
         self.bounds = (-np.inf, np.inf)
         self.failure, self.evaluations = "", 0
         memory = self.scene.memory
-        self._jacobian = cache(
-            lambda: OdeJacobian(model, self.scene.with_power, memory, self.rates)
-        )
+        self._jacobian = cache(lambda: OdeJacobian(model, self.scene.has_power, memory, self.rates))
 
     def rates(self, t: float, y: Array) -> Array:
         """dy/dt; nan where it cannot be evaluated, which makes SciPy try a smaller step."""
@@ -63,18 +61,18 @@ class Equations:
 
     def events(self, t: float, y: Array) -> Array:
         """Values of the events; negative where an event does not hold."""
-        return self.watched(t, y)[: self.calls.n_events]
+        return self.event_values(t, y)[: self.calls.n_events]
 
-    def watched(self, t: float, y: Array) -> Array:
+    def event_values(self, t: float, y: Array) -> Array:
         """Values of the events, followed by the margins of switches."""
-        values = self.scene.watched(t, y)
+        values = self.scene.event_values(t, y)
         if values is None:
             text = self.engine.failure_text(self.scene.run.failure, t)
             raise RunEnded(Status.EVENT_FAILED, text)
         return values
 
-    def see(self, t: float, y: Array, rates: Array) -> Any:
-        """Numbers that the conditions read at the state last given to `watched`, for `enclose`."""
+    def read_numbers(self, t: float, y: Array, rates: Array) -> Any:
+        """Numbers for `enclose` that conditions read at the state of the last `event_values`."""
         numbers = self.ffi.new("double[]", max(1, int(self.calls.n_seen)))
         state, slopes = (np.ascontiguousarray(x, dtype=np.float64) for x in (y, rates))
         self.calls.see(self.calls.context, t, self._c(state), self._c(slopes), numbers)
@@ -87,7 +85,7 @@ class Equations:
         self.calls.enclose(self.calls.context, right - left, seen_left, seen_right, record)
         return bounds
 
-    def lets_through(self, event: int, t: float, y: Array, value: float) -> bool:
+    def passes_through(self, event: int, t: float, y: Array, value: float) -> bool:
         """True if a state moves into a bounce event, whose value there is given."""
         state = self._c(np.ascontiguousarray(y, dtype=np.float64))
         return bool(self.calls.lets_through(self.calls.context, event, t, state, value))

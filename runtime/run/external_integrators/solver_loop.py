@@ -27,8 +27,8 @@ from ..stop_messages import curve_end_message, expression_cause, fastest_speed, 
 from ..switch_crossings import Crossings, ProgressCheck, shortened_step_end
 from ..trajectory import Trajectory
 from . import sundials
-from .between import Between, Look
 from .callbacks import Equations, RunEnded
+from .event_location import ConditionValues, StepConditions
 
 if TYPE_CHECKING:
     from ...engine.compiled_scene import CompiledScene
@@ -105,7 +105,7 @@ class _Loop:
         self.steps = self.event_count = 0
         #: Time of the last event, and time between the last two events, s.
         self.event_time, self.event_interval = settings.t_start, 0.0
-        bounces = self.system.engine.packed.watched.bounces
+        bounces = self.system.engine.packed.event_functions.bounces
         self.min_restitution = min((bounce.restitution for bounce in bounces), default=1.0)
         self.bounces = {bounce.event for bounce in bounces}  # numbers of bounce events
         self.last_bounce: int | None = None  # bounce event from which the present step starts
@@ -117,10 +117,10 @@ class _Loop:
         self.interrupted = Interrupt()
         calls = self.system.calls
         self.n_events = int(calls.n_events)
-        self.closes = self.system.engine.packed.system.closes
+        self.closes = self.system.engine.packed.system.has_loops
         self.is_true = np.zeros(self.n_events, dtype=bool)
         self.crossings = Crossings(int(calls.n_switches), settings.t_end - settings.t_start)
-        self.unseen: tuple[int, float] | None = None
+        self.missed_crossing: tuple[int, float] | None = None
         self.progress = ProgressCheck(settings.t_start, settings.t_end)
         self.time_map = self.system.engine.packed.time_map(settings.t_start, settings.t_end)
 
@@ -147,7 +147,11 @@ class _Loop:
         )  # fmt: skip
         chatter = self.crossings.chatter
         risks = [] if chatter is None else [chattering_note(scene, chatter)]
-        risks += [] if self.unseen is None else [missed_switch_note(scene, *self.unseen)]
+        risks += (
+            []
+            if self.missed_crossing is None
+            else [missed_switch_note(scene, *self.missed_crossing)]
+        )
         return replace(result, risks=tuple(risks))
 
     def run_piece(self, y: Array, stop: float) -> Array:
@@ -189,7 +193,7 @@ class _Loop:
             text = self.step(solver)
             if solver.status == "failed" or not np.isfinite(solver.y).all():
                 raise self.failure(solver.y, text)
-            if not self.progress.has_end(float(solver.t)):
+            if not self.progress.can_reach_end(float(solver.t)):
                 raise self.no_progress()
             stuck_steps = stuck_steps + 1 if solver.t == solver.t_old else 0
             if stuck_steps > _MAX_STUCK_STEPS:
@@ -229,17 +233,17 @@ class _Loop:
         """
         bounce, self.last_bounce = self.last_bounce, None
         if bounce is not None and self.is_true[bounce]:
-            raise self.stopped(bounce)
+            raise self.end_at_event(bounce)
 
     def check_pass_through(self, y: Array, values: Array) -> None:
         """Stop a run that moves from rest on a bounce event into it, where nothing bounces."""
         for event in self.bounces:
-            if self.is_true[event] and self.system.lets_through(event, self.t, y, values[event]):
+            if self.is_true[event] and self.system.passes_through(event, self.t, y, values[event]):
                 failure = Failure(Status.LET_THROUGH, self.t, None, event, 0)
                 text = failure_text(failure, events=self.system.scene.event_names)
                 raise RunEnded(Status.LET_THROUGH, text)
 
-    def stopped(self, event: int) -> RunEnded:
+    def end_at_event(self, event: int) -> RunEnded:
         """End of the run at an event that stops it, or where its bounces come to rest."""
         scene = self.system.scene
         message = f"stopped by {scene.event_names[event]} at t = {self.t:.9g} s"
@@ -348,11 +352,11 @@ class _Loop:
 
     def events(self, t: float, y: Array) -> Array:
         """Values of the events at a state; a value that is nan ends the run."""
-        return self.watched(t, y)[: self.n_events]
+        return self.event_values(t, y)[: self.n_events]
 
-    def watched(self, t: float, y: Array) -> Array:
+    def event_values(self, t: float, y: Array) -> Array:
         """Values of the events, then margins of switches; an event value of nan ends the run."""
-        values = self.system.watched(t, y)
+        values = self.system.event_values(t, y)
         is_nan = np.isnan(values[: self.n_events])
         if is_nan.any():
             name = self.system.scene.event_names[int(np.argmax(is_nan))]
@@ -388,7 +392,7 @@ class _Loop:
             self.rows.append(before)
         self.rows.append((t, np.array(y), np.array(self.system.scene.memory), event + 1))
         if action == lib.MSTMM_FIRE_STOP:
-            raise self.stopped(event)
+            raise self.end_at_event(event)
         is_repeated_bounce = self.event_interval and event in self.bounces
         self.last_bounce = event if is_repeated_bounce else None
         return True
@@ -398,11 +402,11 @@ class _Loop:
         if not self.crossings.n:
             return None
         conditions, n = self.conditions(solver), self.n_events
-        left = conditions.look(float(solver.t_old))
+        left = conditions.evaluate(float(solver.t_old))
         signs = -np.sign(left.values)  # signs after a crossing; 0 until a switch leaves zero
         for t in solver.t_old + _EVALUATION_POINTS * (solver.t - solver.t_old):
-            right = conditions.look(float(t))
-            indices = np.flatnonzero(self.crossings.watched) + n
+            right = conditions.evaluate(float(t))
+            indices = np.flatnonzero(self.crossings.is_watched) + n
             indices_off_zero = [i for i in indices.tolist() if signs[i]]
             crossing = self.first_crossing(conditions, indices_off_zero, signs, left, right)
             if crossing is not None:
@@ -418,11 +422,11 @@ class _Loop:
         if not len(self.is_true):
             return switch
         conditions, n = self.conditions(solver), self.n_events
-        left = conditions.look(float(solver.t_old))
+        left = conditions.evaluate(float(solver.t_old))
         end = solver.t if switch is None else switch[1]
         is_false = (left.values[:n] < 0) | ~self.is_true
         for t in solver.t_old + _EVALUATION_POINTS * (end - solver.t_old):
-            right = conditions.look(float(t))
+            right = conditions.evaluate(float(t))
             indices = np.flatnonzero(is_false).tolist()
             crossing = self.first_crossing(conditions, indices, np.ones(n), left, right)
             if crossing is not None:
@@ -430,19 +434,26 @@ class _Loop:
             left, is_false = right, right.values[:n] < 0
         return switch
 
-    def conditions(self, solver: Any) -> Between:
+    def conditions(self, solver: Any) -> StepConditions:
         """Conditions within the last step."""
         start, end = float(solver.t_old), float(solver.t)
         dense = solver.dense_output()
-        return Between(self.system, self.watched, dense, start, end, self.unseen)
+        return StepConditions(
+            self.system, self.event_values, dense, start, end, self.missed_crossing
+        )
 
     def first_crossing(
-        self, conditions: Between, indices: list[int], signs: Array, left: Look, right: Look
+        self,
+        conditions: StepConditions,
+        indices: list[int],
+        signs: Array,
+        left: ConditionValues,
+        right: ConditionValues,
     ) -> tuple[int, float] | None:
         """(index, time) of the first of the given conditions to cross between left and right."""
-        times = {i: conditions.first(i, float(signs[i]), left, right) for i in indices}
+        times = {i: conditions.first_crossing(i, float(signs[i]), left, right) for i in indices}
         crossings = [(time, i) for i, time in times.items() if time is not None]
-        self.unseen = conditions.unseen
+        self.missed_crossing = conditions.missed_crossing
         return min(crossings)[::-1] if crossings else None
 
     # --- samples --------------------------------------------------------------------------------

@@ -29,10 +29,10 @@ class ClosedStates:
 
     def __init__(self, model: CompiledScene, freedom: IndependentSpeeds, t: float) -> None:
         self.engine, self.freedom, self.t = model.looped, freedom, t
-        self.layout, self.sizes = model.layout, speed_scales(model)
+        self.layout, self.sizes = model.coordinate_layout, speed_scales(model)
         self.memory = model.looped.start_memory()
         self._scene = SceneSystem(model.looped, with_power=False)
-        self._still = np.zeros(model.nu)
+        self._zero_speeds = np.zeros(model.nu)
 
     def state(self, q: Array, u: Array | None = None) -> tuple[Array, Array]:
         """Nearby state (q, u) that satisfies all constraints; u = 0 before projection by default.
@@ -40,7 +40,7 @@ class ClosedStates:
         Raises NumericalFailure where the loops do not close.
         """
         try:
-            y = self._scene.start(self.t, q, self._still if u is None else u)
+            y = self._scene.start(self.t, q, self._zero_speeds if u is None else u)
         except SceneError as error:
             raise NumericalFailure(str(error)) from None
         return y[: self.engine.nq], y[self.engine.nq :]
@@ -54,7 +54,7 @@ class ClosedStates:
         udot = self.engine.accelerations(*state)[1][0]
         return np.asarray(udot - follows @ udot[list(places)])
 
-    def moved(self, q: Array, places: Sequence[int], motion: Array) -> Array:
+    def move(self, q: Array, places: Sequence[int], motion: Array) -> Array:
         """q after a motion of the independent speeds `places`, with all loops closed."""
         length = float(np.abs(motion / self.sizes[list(places)]).max(initial=0.0))
         step_count = max(1, int(np.ceil(length / _MAX_STEP)))
@@ -62,10 +62,10 @@ class ClosedStates:
             q = self._step(q, places, motion / step_count)
         return q
 
-    def moved_beside(self, q: Array, places: Sequence[int], motion: Array, held: int) -> Array:
+    def move_with_fixed(self, q: Array, places: Sequence[int], motion: Array, held: int) -> Array:
         """q after a motion that leaves the coordinates of the first `held` speeds unchanged."""
         start = q
-        q = self.moved(q, places, motion)
+        q = self.move(q, places, motion)
         for _ in range(_MAX_CORRECTIONS):
             drift = np.zeros(len(places))
             drift[:held] = self._motion_to(start, q, places[:held])
@@ -75,8 +75,8 @@ class ClosedStates:
         return q
 
     def _step(self, q: Array, places: Sequence[int], motion: Array) -> Array:
-        follows = self.freedom.following(q, places)
-        return self.state(self.freedom.moved(q, follows @ motion))[0]
+        follows = self.freedom.motion_matrix(q, places)
+        return self.state(self.freedom.move(q, follows @ motion))[0]
 
     def _motion_to(self, target: Array, q: Array, places: Sequence[int]) -> Array:
         """Motion along the speeds `places` that moves their coordinates from q to `target`."""
@@ -84,7 +84,7 @@ class ClosedStates:
         slots_by_speed = {slots.u: slots for slots in map(self.layout.hinge_of_speed, places)}
         for slots in slots_by_speed.values():
             gap = (target - q)[slots.q_slice]
-            if not slots.straight:
+            if not slots.rates_are_speeds:
                 speeds = np.eye(len(motion))[slots.u_slice]
                 rates = [self.engine.rates(self.t, q, speed, self.memory) for speed in speeds]
                 rate_matrix = np.array(rates)[:, slots.q_slice].T

@@ -11,7 +11,12 @@ from numpy.typing import NDArray
 from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure
 
-from ...engine.statics.rest import Rest, Undetermined, Unsettled, find_determined_equilibrium
+from ...engine.statics.static_equilibrium import (
+    EquilibriumNotFoundError,
+    EquilibriumProblem,
+    UndeterminedEquilibriumError,
+    find_determined_equilibrium,
+)
 from ...flexible.modal_body import ModalBody
 from ...flexible.modal_scales import modal_sizes
 from ...packing.coordinate_layout import HingeSlots
@@ -54,7 +59,7 @@ def static_deformation(
         return result
 
     scales = np.concatenate([modal_sizes(body) for body in bodies.values()])
-    problem = Rest(lambda q: inverse_dynamics(q, u, zero)[u_indices], advance, scales)
+    problem = EquilibriumProblem(lambda q: inverse_dynamics(q, u, zero)[u_indices], advance, scales)
     return _find_deformation(problem, q, bodies, slots)
 
 
@@ -71,15 +76,15 @@ def static_deformation_with_loops(
     has with rigid bodies, keep their coordinates and speeds, as do the modes of other bodies; the
     other hinges follow.
     """
-    slots, closed = model.layout.modal, ClosedStates(model, freedom, 0.0)
+    slots, closed = model.coordinate_layout.modal, ClosedStates(model, freedom, 0.0)
     modal_speeds = _indices(slots[name].u_slice for name in bodies).tolist()
-    fixed, own = freedom.settling(q, modal_speeds, *_fixed_speeds(model, u, bodies))
+    fixed, own = freedom.select_fixed_speeds(q, modal_speeds, *_fixed_speeds(model, u, bodies))
     independent, count = (*fixed, *own), len(fixed)
     independent_u = np.append(u[list(fixed)], np.zeros(len(own)))
 
     def motion(q: Array) -> tuple[Array, Array, Array]:
         """All speeds and accelerations for unaccelerated independent speeds, and the Jacobian."""
-        jacobian, projected_u = freedom.following(q, independent), closed.state(q, u)[1]
+        jacobian, projected_u = freedom.motion_matrix(q, independent), closed.state(q, u)[1]
         speeds = projected_u + jacobian @ (independent_u - projected_u[list(independent)])
         speeds[list(independent)] = independent_u
         return speeds, closed.accelerations(q, speeds, independent, jacobian), jacobian
@@ -90,9 +95,9 @@ def static_deformation_with_loops(
         return np.asarray(jacobian[:, count:].T @ efforts)
 
     def advance(q: Array, increment: Array) -> Array:
-        return closed.moved_beside(q, independent, np.append(np.zeros(count), increment), count)
+        return closed.move_with_fixed(q, independent, np.append(np.zeros(count), increment), count)
 
-    problem = Rest(modal_efforts, advance, closed.sizes[list(own)], own)
+    problem = EquilibriumProblem(modal_efforts, advance, closed.sizes[list(own)], own)
     q = _find_deformation(problem, q, bodies, slots)
     return q, motion(q)[0]
 
@@ -105,10 +110,10 @@ def _fixed_speeds(
     The former belong to hinges with `hold` and to the modes of other bodies, the latter to hinges
     with a given speed.
     """
-    layout, free = model.layout, set(model.free_speeds)
+    layout, free = model.coordinate_layout, set(model.free_speed_indices)
     slices = [slots.u_slice for name, slots in layout.modal.items() if name not in bodies]
-    slices += [layout.hinges[h.name].u_slice for h in model.packed.described.hinge if h.hold]
-    fast = [] if model.closed is None else model.closed.fast
+    slices += [layout.hinges[h.name].u_slice for h in model.packed_scene.user_scene.hinge if h.hold]
+    fast = [] if model.loop_start is None else model.loop_start.fast_hinges
     preferred = _indices(layout.hinges[name].u_slice for name in fast).tolist()
     fixed = [k for k in _indices(slices).tolist() if k in free]
     return fixed, [k for k in preferred if k in free - {*fixed} and u[k]]
@@ -119,13 +124,16 @@ def _indices(slices: Iterable[slice]) -> NDArray[np.int64]:
 
 
 def _find_deformation(
-    problem: Rest, q: Array, bodies: Mapping[str, ModalBody], slots: Mapping[str, HingeSlots]
+    problem: EquilibriumProblem,
+    q: Array,
+    bodies: Mapping[str, ModalBody],
+    slots: Mapping[str, HingeSlots],
 ) -> Array:
     try:
         q = find_determined_equilibrium(problem, q, _ACCURACY)
-    except (Unsettled, Undetermined) as failure:
+    except (EquilibriumNotFoundError, UndeterminedEquilibriumError) as failure:
         names = ", ".join(f'"{name}"' for name in bodies)
-        is_critical = isinstance(failure, Undetermined)
+        is_critical = isinstance(failure, UndeterminedEquilibriumError)
         load = "are at the buckling load" if is_critical else "may exceed the buckling load"
         raise NumericalFailure(
             f"{names}: no static deformation found under the loads at t = 0, which {load}; "

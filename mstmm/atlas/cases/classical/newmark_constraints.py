@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ....runtime.integrate.methods import ClassicalDiscreteTime
 from ...case_definition import CaseDefinition, MethodDefinition
 from ...error_measures import simulate_to_end
 from ...parameter_scale import LOG_SCALE
@@ -14,7 +15,8 @@ STEP = 0.01
 
 def _energy_change(t_end: float, scheme: str) -> float:
     steps = max(1, round(t_end / STEP))
-    run = simulate_to_end(double_pendulum(), steps * STEP, "dttmm-classical", STEP, scheme=scheme)
+    method = ClassicalDiscreteTime(scheme=scheme)
+    run = simulate_to_end(double_pendulum(), steps * STEP, method, STEP)
     energy = np.asarray(run.energy())
     exchanged = np.ptp(np.asarray(run.quantity("energy.kinetic").values))
     return float(np.abs(energy - energy[0]).max() / exchanged)
@@ -23,7 +25,7 @@ def _energy_change(t_end: float, scheme: str) -> float:
 CASE = CaseDefinition(
     name="newmark-constraints",
     title="Undamped Newmark in absolute coordinates: length of a run",
-    why="Where hinges are constraints at position level, their loads follow the second "
+    cause="Where hinges are constraints at position level, their loads follow the second "
     "difference of positions. The trapezoidal rule keeps every other error of these loads: they "
     "oscillate, grow slowly and then explode, however far the steps are iterated. Schemes that "
     "damp infinitely fast motion avoid this, and hinge coordinates have no such loads.",

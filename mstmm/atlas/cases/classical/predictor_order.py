@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 
 from ....array_validation import Array
+from ....runtime.integrate.methods import ClassicalDiscreteTime
 from ...case_definition import CaseDefinition, MethodDefinition
 from ...error_measures import simulate_to_end
 from ...parameter_scale import COUNT_SCALE
@@ -22,10 +23,8 @@ def _without_predictor(steps: int) -> Array:
 
 
 def _with_predictor(steps: int) -> Array:
-    run = simulate_to_end(
-        double_pendulum(), T_END, "dttmm-classical", T_END / steps, output_times=[T_END],
-        scheme="newmark",
-    )  # fmt: skip
+    method = ClassicalDiscreteTime(scheme="newmark")
+    run = simulate_to_end(double_pendulum(), T_END, method, T_END / steps, output_times=[T_END])
     return run.q[-1]
 
 
@@ -52,7 +51,7 @@ def _excess(steps: float, end_of: Callable[[int], Array]) -> float:
 CASE = CaseDefinition(
     name="predictor-order",
     title="One solution per step: a predictor without motion",
-    why="Expanded about the start of a step, the hinge constraints omit the rotation of the "
+    cause="Expanded about the start of a step, the hinge constraints omit the rotation of the "
     "hinge points within the step, an error of second order. Loads depend on the second difference "
     "of that error, and centripetal accelerations are wrong however short the steps are. A "
     "predictor with the accelerations has an error of third order. Second order is measured from "

@@ -18,7 +18,7 @@ def _largest_gap(step: float, scheme: str) -> float:
     run, largest = ClassicalSteps(double_pendulum(), parse_scheme(scheme), ITERATIONS), 0.0
     for _ in range(round(T_END / step)):
         run.advance(step)
-        upper, lower = run.moving()
+        upper, lower = run.part_movements()
         elbow = upper.position + upper.axes[:, :, 0]
         largest = max(largest, *np.abs([upper.position, lower.position - elbow]).max(axis=(1, 2)))
     return largest
@@ -27,7 +27,7 @@ def _largest_gap(step: float, scheme: str) -> float:
 CASE = CaseDefinition(
     name="wilson-gaps",
     title="Wilson's method in absolute coordinates: hinges that open",
-    why="Wilson's collocation satisfies the equations, and with them the constraints, after the "
+    cause="Wilson's collocation satisfies the equations, and with them the constraints, after the "
     "end of the step. The hinges are closed there, but not at the end of the step to which the "
     "method returns. However far a step is iterated, the gaps are of fourth order in the step. "
     "Schemes that satisfy the constraints at the end of the step close them to rounding.",

@@ -39,7 +39,7 @@ def _error(shapes: float, basis: str) -> float:
 CASE = CaseDefinition(
     name="end-moment",
     title="Shapes of a free end under an end moment",
-    why="The eigenfunctions of a beam with a free end have no curvature there. A moment at that "
+    cause="The eigenfunctions of a beam with a free end have no curvature there. A moment at that "
     "end, or a body welded to it, requires one, and their sum converges to it slowly. Two static "
     "shapes of the end loads represent it at once; the basis `auto` uses them where hinges need "
     "them.",

@@ -44,7 +44,7 @@ def _error(spin: float, stiffening: bool) -> float:
 CASE = CaseDefinition(
     name="linear-beam",
     title="Linear beam: spin above its first frequency",
-    why="In the axes of a linear beam the centrifugal force increases every deflection. Nothing "
+    cause="In the axes of a linear beam the centrifugal force increases every deflection. Nothing "
     "opposes it, because the shortening of the bent axis is neglected: at a spin equal to the "
     "first frequency the stiffness vanishes. With the shortening the spin stiffens the beam, as it "
     "should.",

@@ -16,7 +16,7 @@ def _error(slenderness: float, order: int) -> float:
 CASE = CaseDefinition(
     name="linear-elements",
     title="Solid elements of degree 1: slenderness of a bar in bending",
-    why="An element with linear displacements cannot bend: its edges stay straight, and it shows "
+    cause="An element with linear displacements cannot bend: its edges stay straight, and it shows "
     "shear instead of curvature. The energy of that shear grows with the square of its length over "
     "its thickness. The bar locks, and all its bending frequencies are too high. (Poisson's ratio "
     "is 0 here, so that no other locking occurs.) Elements of degree 2 can be curved. Their "

@@ -49,7 +49,7 @@ def _error(weight: float, stiffening: bool) -> float:
 CASE = CaseDefinition(
     name="linear-weight",
     title="Linear beam under its weight: worse than a rigid one",
-    why="In the axes of a pinned end only the bending stiffness of a falling beam opposes its "
+    cause="In the axes of a pinned end only the bending stiffness of a falling beam opposes its "
     "weight and the centrifugal force. Linear equations neglect that the force along the beam "
     "stiffens it as it swings. Their correction of a rigid rod is then worse than none.",
     parameter="weight, in EI/L²",

@@ -15,7 +15,7 @@ def _error(z: float, inertia: float) -> float:
 CASE = CaseDefinition(
     name="long-parts",
     title="Exact beams: dynamic stiffness of long elements",
-    why="Hyperbolic functions in the quotients of the dynamic stiffness grow with exp(beta L) "
+    cause="Hyperbolic functions in the quotients of the dynamic stiffness grow with exp(beta L) "
     "and cancel only in the quotient. The quotients stay accurate longer than transfer matrices, "
     "which have lost all digits at the twelfth mode. At last numerator and divisor both overflow, "
     "and the quotient is undefined. Divided by the growing terms, only decaying exponentials "

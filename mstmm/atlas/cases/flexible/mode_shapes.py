@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ....array_validation import Array
-from ....runtime.flexible.beam.gauss_quadrature import gauss_between
+from ....runtime.flexible.beam.gauss_quadrature import gauss_points
 from ....runtime.flexible.beam.shape_functions import Eigenfunction
 from ...case_definition import CaseDefinition, MethodDefinition
 from ...parameter_scale import COUNT_SCALE
@@ -20,7 +20,7 @@ def _stable_shape(number: int, xi: Array) -> Array:
 
 def _error(number: float, shape: Callable[[int, Array], Array]) -> float:
     """Error of the integral of the squared shape over the length, which is scaled to 1."""
-    xi, weights = gauss_between((0.0, 1.0), lambda a, b: number + 1.0)
+    xi, weights = gauss_points((0.0, 1.0), lambda a, b: number + 1.0)
     with np.errstate(over="ignore", invalid="ignore"):
         return abs(float(weights @ shape(int(number), xi) ** 2) - 1)
 
@@ -28,7 +28,7 @@ def _error(number: float, shape: Callable[[int, Array], Array]) -> float:
 CASE = CaseDefinition(
     name="mode-shapes",
     title="Mode shapes by hyperbolic functions: their number",
-    why="In the printed form with cosh and sinh a shape is the difference of two numbers that "
+    cause="In the printed form with cosh and sinh a shape is the difference of two numbers that "
     "grow by a factor of 23 per half-wave. At the end of about the eleventh shape no digit of it "
     "is left. The same shape written with exponentials that decay from both ends keeps all digits.",
     parameter="number of the shape",

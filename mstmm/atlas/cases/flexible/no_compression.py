@@ -14,7 +14,7 @@ LINEAR_MESH, QUADRATIC_MESH = (30, 3, 3), (20, 1, 1)
 CASE = CaseDefinition(
     name="no-compression",
     title="Solid elements of degree 1: nearly incompressible material",
-    why="Near a Poisson's ratio of 1/2 every integration point constrains the volume around it. "
+    cause="Near a Poisson's ratio of 1/2 every integration point constrains the volume around it. "
     "A mesh of degree 1 has fewer displacements than such constraints: rubber locks in every "
     "direction, whatever the shape of its elements. A mesh of degree 2 has enough displacements to "
     "bend; its error of 3 % at the incompressible end halves with the element size.",

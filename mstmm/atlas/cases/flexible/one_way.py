@@ -44,7 +44,7 @@ def _error(ratio: float, level: str) -> float:
 CASE = CaseDefinition(
     name="one-way",
     title="One-way coupling: a beam that does not act on its hub",
-    why="A beam that only responds to the motion of a rigid run costs next to nothing, and is "
+    cause="A beam that only responds to the motion of a rigid run costs next to nothing, and is "
     "accurate as long as the body that carries it is heavy. Otherwise the hub moves with the "
     "vibration, which changes its frequency and size, and the response may be worse than none.",
     parameter="inertia of the hub over that of the beam",

@@ -15,7 +15,7 @@ def _error(z: float, inertia: float) -> float:
 CASE = CaseDefinition(
     name="short-parts",
     title="Exact beams: dynamic stiffness of short elements",
-    why="Entries of the dynamic stiffness are quotients of circular and hyperbolic functions. "
+    cause="Entries of the dynamic stiffness are quotients of circular and hyperbolic functions. "
     "For short elements numerator and divisor vanish together, and their quotient is the static "
     "stiffness, next to which inertia is of the size of (beta L)^4. A beam divided into many "
     "elements loses its mass in rounding. The remedy computes the terms beyond the static "

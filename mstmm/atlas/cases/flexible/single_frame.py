@@ -43,7 +43,7 @@ def _error(load: float, pieces: int, shapes: int) -> float:
 CASE = CaseDefinition(
     name="single-frame",
     title="One floating frame: large deflections of a beam",
-    why="Shape functions are small deflections from a frame. One frame is accurate only as long "
+    cause="Shape functions are small deflections from a frame. One frame is accurate only as long "
     "as the sections of the beam rotate little against it: the relative error of the deflection is "
     "half the square of the slope. More shapes do not help; welded pieces with separate frames do.",
     parameter="load across the tip of a clamped beam, in EI/L²",

@@ -33,7 +33,7 @@ def _lost_inertia(deflection: float, quadrature: bool) -> float:
 CASE = CaseDefinition(
     name="stiffened-mass",
     title="Stiffened beam: inertia truncated after the second order",
-    why="Shortening makes the mass matrix of a beam depend on its deflection. Truncated after "
+    cause="Shortening makes the mass matrix of a beam depend on its deflection. Truncated after "
     "the second power, it subtracts more inertia than there is where shapes carry nearly all of "
     "it, as in a frame tangent to a rotating section. Accelerations then change their sign. Mass "
     "in points along the beam (`quadrature`), or the mean frame, keeps the matrix positive "

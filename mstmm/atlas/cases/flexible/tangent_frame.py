@@ -31,7 +31,7 @@ def _largest_angle(shapes: float, frame: str) -> float:
 CASE = CaseDefinition(
     name="tangent-frame",
     title="Frame tangent to a beam at a pinned end",
-    why="Many clamped shapes together can nearly represent the rotation of a pinned beam without "
+    cause="Many clamped shapes together can nearly represent the rotation of a pinned beam without "
     "its frame. The inertia left for the frame falls with the third power of their number, and a "
     "damper in the pin then causes a motion faster than any of the beam. A chord frame, or the "
     "mean frame, has ten times more of the inertia.",

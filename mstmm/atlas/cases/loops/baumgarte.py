@@ -32,13 +32,15 @@ def _projected_gap() -> float:
     times = STEP * np.arange(STEPS + 1)
     run = simulate_to_end(linkage, times[-1], "rk4", STEP, output_times=times)
     calls, still = LoopCalls(linkage.looped, run.q[0]), np.zeros(linkage.nu)
-    return max(float(np.abs(calls.correction(calls.gap, q, still)[1]).max()) for q in run.q)
+    return max(
+        float(np.abs(calls.correction(calls.position_level, q, still)[1]).max()) for q in run.q
+    )
 
 
 CASE = CaseDefinition(
     name="baumgarte",
     title="Closed loops with springs and dampers: a four-bar",
-    why="Accelerations that satisfy the constraints leave the position gap of a loop to the "
+    cause="Accelerations that satisfy the constraints leave the position gap of a loop to the "
     "errors of the steps, and it grows. Baumgarte closes it by a spring and a damper, whose rate "
     "the user has to choose. A low rate has little effect. A high one makes the equations stiff, "
     "until the steps are too long for it. Projecting positions and speeds after each step needs no "

@@ -36,7 +36,7 @@ def _error(ratio: float, by_masses: bool) -> float:
 CASE = CaseDefinition(
     name="dropped-rows",
     title="Rank of a loop with true masses: a heavy coupler",
-    why="The number of independent rows follows from the motions of the bodies under loads along "
+    cause="The number of independent rows follows from the motions of the bodies under loads along "
     "the rows. A heavy coupler moves less than light cranks by the mass ratio. Once that is below "
     "the threshold of the rank, an independent row is dropped, and the linkage comes apart. The "
     "dependence of rows is a matter of geometry, not of masses: determined once with equal masses, "

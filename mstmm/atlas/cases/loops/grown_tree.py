@@ -34,7 +34,7 @@ def _mean_work(pairs: float, build_tree: Callable[[MechanismGraph], Tree]) -> fl
 CASE = CaseDefinition(
     name="grown-tree",
     title="Closed loops: the tree of a scissor lift",
-    why="Rows of a loop are carried through every hinge from the cut to the body where the loop "
+    cause="Rows of a loop are carried through every hinge from the cut to the body where the loop "
     "closes, and all pairs of rows at a hinge are coupled. Grown breadth first (shortest paths), "
     "the tree of a lift supports each bar from below and cuts the middle pins. All loops close at "
     "the base, and the work grows with the square of their number. Depth first is as bad for "

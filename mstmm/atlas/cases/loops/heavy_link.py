@@ -17,14 +17,14 @@ def _error(ratio: float, refined: bool) -> float:
         arch = compile_looped(rod_arch([1.0, 1.0, 1.0, ratio, 1.0]))
     except SceneError as error:  # all digits are lost
         raise NumericalFailure(str(error)) from None
-    arch.packed.model.refines = int(refined)
+    arch.packed_scene.model.refines = int(refined)
     return rounding_error(arch, [arch.initial_state()])
 
 
 CASE = CaseDefinition(
     name="heavy-link",
     title="Closed loops: a heavy link outboard of light ones",
-    why="The loads that close a loop follow from the accelerations of its rods under a load at "
+    cause="The loads that close a loop follow from the accelerations of its rods under a load at "
     "the cut. Light rods inboard of a heavy one respond far more than it does, and its response is "
     "a difference of large numbers. Inverse dynamics eliminates nothing: its residual is small and "
     "accurate, and a second sweep corrects the result by it.",

@@ -29,7 +29,7 @@ def _error(spread: float, by_masses: bool) -> float:
     """Relative excess of the gap; at the least gap coupler and rocker are in line."""
     linkage = _linkage(spread)
     q = linkage.initial_state()[0]
-    hinges = linkage.layout.hinges
+    hinges = linkage.coordinate_layout.hinges
     q[hinges["foot"].q_slice] = CRANK_ANGLE
     q[hinges["knee"].q_slice] += COUPLER_OFFSET
     pose = nearest_pose(linkage, q, "foot", by_masses)
@@ -46,7 +46,7 @@ def _error(spread: float, by_masses: bool) -> float:
 CASE = CaseDefinition(
     name="least-gap",
     title="Least gaps of open loops weighted by masses: a slender coupler",
-    why="Where a loop cannot be closed, the pose of the least gap shows the reason. Weighted by "
+    cause="Where a loop cannot be closed, the pose of the least gap shows the reason. Weighted by "
     "the mobility of each row, gaps across a coupler with its mass in the middle count next to "
     "nothing. The iteration then ends with the bodies far apart, and the message reports a "
     "misleading gap and pose. One scale for all rows of a kind leaves the least gap to the "

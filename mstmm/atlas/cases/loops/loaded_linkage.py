@@ -42,7 +42,7 @@ def _error_with_rotating_loads(load: float) -> float:
 CASE = CaseDefinition(
     name="loaded-linkage",
     title="Frequencies of closed loops: a linkage under load",
-    why="The tree of a mechanism, linearised along the motions that its loops allow, has the "
+    cause="The tree of a mechanism, linearised along the motions that its loops allow, has the "
     "right masses and springs, and the weight of every body as if it swung independently. The "
     "loads of the loop are missing: those at its cut rotate with the rods, and stiffen or soften "
     "the whole. With stiff springs the error is small; for a linkage supported by its weight the "

@@ -25,13 +25,15 @@ def _error_with_speeds(step: float) -> float:
     run = simulate_to_end(linkage, times[-1], "rk4", step, output_times=times)
     calls = LoopCalls(linkage.looped, run.q[0])
     states = zip(run.q, run.u, strict=True)
-    return max(float(np.abs(calls.correction(calls.slip, *state)[1]).max()) for state in states)
+    return max(
+        float(np.abs(calls.correction(calls.velocity_level, *state)[1]).max()) for state in states
+    )
 
 
 CASE = CaseDefinition(
     name="projected-places",
     title="Closed loops with projection of positions only: a four-bar",
-    why="Projected positions make the loop look closed after each step. Its speeds still violate "
+    cause="Projected positions make the loop look closed after each step. Its speeds still violate "
     "the constraints, and the next step follows them: angles of this four-bar have 6 to 18 times "
     "the error of a run with projected speeds. That projection costs one more pass with factors "
     "that are available.",

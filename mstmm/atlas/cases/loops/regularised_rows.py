@@ -31,7 +31,7 @@ def _error(angle: float, regularised: bool) -> float:
 CASE = CaseDefinition(
     name="regularised-rows",
     title="Regularised closed loops: a nearly singular parallelogram",
-    why="Redundant rows make the equations of the multipliers singular, and a small multiple of "
+    cause="Redundant rows make the equations of the multipliers singular, and a small multiple of "
     "the unit matrix regularises them: every row then yields by that amount. Near a singular "
     "configuration one of the other rows responds with the square of the distance, and yields like "
     "the rest. The linkage then leaves its path long before the singular pose. A fixed choice of "

@@ -43,7 +43,7 @@ def _error_with_fixed_rows(askew: float) -> float:
 CASE = CaseDefinition(
     name="repeated-rows",
     title="Redundant rows with axes not quite parallel: a four-bar",
-    why="A pin that closes a planar loop in space has five rows, of which three are redundant. "
+    cause="A pin that closes a planar loop in space has five rows, of which three are redundant. "
     "Where the axes are misaligned by less than any drawing tolerance, these rows disagree by the "
     "square of the angle. Once that exceeds rounding, a rank by rounding keeps them, and the "
     "linkage is locked. Compared with the mobility of their hinge they are redundant, and are left "

@@ -34,7 +34,7 @@ def _error_by_pivots(number: float) -> float:
         for k in range(parts)
     ]  # fmt: skip
     modes = compile_looped({"gravity": [0, 0, 0], "beam": beams, "hinge": hinges}).modes(count)
-    if not modes.complete:
+    if not modes.is_complete:
         return 1.0
     return abs(float(np.sqrt(modes.omega[-1])) / wave_number("clamped-free", count) - 1)
 
@@ -42,7 +42,7 @@ def _error_by_pivots(number: float) -> float:
 CASE = CaseDefinition(
     name="determinant-search",
     title="Frequencies as zeros of a determinant: their number",
-    why="The determinant of the conditions at a free end is a difference of products of entries "
+    cause="The determinant of the conditions at a free end is a difference of products of entries "
     "that grow with exp(beta L). Above about the eleventh mode of a cantilever only rounding is "
     "left of it, with an arbitrary sign; more elements do not help. The pivots of the sweep stay "
     "of the size of the stiffness, and the number of negative ones is the number of modes below a "

@@ -22,7 +22,7 @@ def _error(degrees: float, **options: float | str) -> float:
 CASE = CaseDefinition(
     name="product-angle",
     title="Product of transfer matrices: angle between neighbouring axes",
-    why="The pivot of a pin's matrix is the inertia of one body that couples its axis with that "
+    cause="The pivot of a pin's matrix is the inertia of one body that couples its axis with that "
     "of the next pin. It falls with the cosine of the angle and is zero at 90 degrees, usual in "
     "robot arms, while the mass matrix stays regular.",
     parameter="angle between neighbouring pins",

@@ -32,7 +32,7 @@ def _error(count: float, method: str) -> float:
 CASE = CaseDefinition(
     name="product-beams",
     title="Product of discrete-time matrices: a row of beams",
-    why="Modal rows make the matrices of beams far worse conditioned than those of rigid bodies. "
+    cause="Modal rows make the matrices of beams far worse conditioned than those of rigid bodies. "
     "A product of a few of them has no accurate digit, and fewer with shorter steps. The same "
     "matrices eliminated by Riccati from the tip inwards stay accurate.",
     parameter="welded beams of three shapes",

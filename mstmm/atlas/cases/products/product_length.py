@@ -20,7 +20,7 @@ def _error(count: float, **options: float | str) -> float:
 CASE = CaseDefinition(
     name="product-length",
     title="Product of transfer matrices: length of a chain",
-    why="The product eliminates from the root outwards, a shooting method: the rounding error of "
+    cause="The product eliminates from the root outwards, a shooting method: the rounding error of "
     "one body grows fourfold at the next, though the chain is well conditioned. The Riccati sweep "
     "eliminates from the tips inwards, with positive definite pivots.",
     parameter="rods on parallel pins", unit="", low=2, high=60, scale=COUNT_SCALE,

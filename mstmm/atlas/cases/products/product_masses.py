@@ -21,7 +21,7 @@ def _error(ratio: float, **options: Any) -> float:
 CASE = CaseDefinition(
     name="product-masses",
     title="Product of transfer matrices: light bodies outboard of heavy ones",
-    why="The product passes the loads of the heavy root on to a tip, where they must cancel down "
+    cause="The product passes the loads of the heavy root on to a tip, where they must cancel down "
     "to those of a light body. The mass ratio multiplies their rounding error. The sweep does not "
     "form that difference.",
     parameter="mass of a rod over that of its inboard neighbour", unit="", low=1e-3, high=1.0,

@@ -25,7 +25,7 @@ def _error(distance: float, **options: float | str) -> float:
 CASE = CaseDefinition(
     name="product-pivot",
     title="Product of transfer matrices: a pivot that vanishes",
-    why="The pivot of a planar pin is zero where the output end of its body is the centre of "
+    cause="The pivot of a planar pin is zero where the output end of its body is the centre of "
     "percussion of the input end, as for a dumbbell. An impact there does not move the inner end. "
     "Digits are lost long before the guard names the hinge.",
     parameter="distance of the moment of inertia from that of a dumbbell", unit="",

@@ -21,7 +21,7 @@ def _error(ratio: float, **options: Any) -> float:
 CASE = CaseDefinition(
     name="product-root",
     title="Product of transfer matrices: one heavy body at the root",
-    why="All loads of the root pass through all matrices before the condition at the tip cancels "
+    cause="All loads of the root pass through all matrices before the condition at the tip cancels "
     "them. One heavy body is enough: its loads are rounded at their size, and that error moves the "
     "light bodies outboard of it. The sweep reaches the heavy body last, and the contribution of "
     "the light bodies may be rounded there without harm.",

@@ -37,7 +37,7 @@ def _error(distance: float, kind: str) -> float:
 CASE = CaseDefinition(
     name="gimbal-passage",
     title="Three angles: the attitude at which they are singular",
-    why="Where the second of three angles passes 90 degrees, the axes of the first and the third "
+    cause="Where the second of three angles passes 90 degrees, the axes of the first and the third "
     "coincide. Their rates grow without bound, and steps that are accurate elsewhere lose all "
     "digits. Whether a step hits or jumps over the attitude is a matter of chance. The quaternion "
     "of a ball hinge has no such attitude.",

@@ -10,7 +10,7 @@ from ...variants import naive_rotation_vectors
 CASE = CaseDefinition(
     name="plain-charts",
     title="Rotation vectors whose rate is the angular velocity",
-    why="Within a step an attitude may be described by a rotation vector, three numbers without "
+    cause="Within a step an attitude may be described by a rotation vector, three numbers without "
     "a constraint. Its rate equals the angular velocity only where it is zero; elsewhere products "
     "of both are added. Without them every method falls to second order, whatever the order of its "
     "table. Runs keep two of them, enough for fifth order, or use quaternions.",

@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 
 from ....array_validation import Array
+from ....runtime.integrate.methods import ClassicalDiscreteTime
 from ....runtime.model.model import Model
 from ...case_definition import CaseDefinition, MethodDefinition
 from ...error_measures import simulate_to_end
@@ -54,17 +55,15 @@ def _error(rate: float, additive: bool) -> float:
     if additive:
         coordinates = additive_rotations.final_coordinates(_two_rods(), step, steps, RADIUS)
     else:
-        coordinates = simulate_to_end(
-            _two_rods(), T_END, "dttmm-classical", step, output_times=[T_END],
-            scheme=f"generalised-alpha:{RADIUS}",
-        ).q[-1]  # fmt: skip
+        method = ClassicalDiscreteTime(scheme=f"generalised-alpha:{RADIUS}")
+        coordinates = simulate_to_end(_two_rods(), T_END, method, step, output_times=[T_END]).q[-1]
     return float(np.abs(coordinates - _exact()).max())
 
 
 CASE = CaseDefinition(
     name="plain-turns",
     title="Finite rotations without the tangent operator",
-    why="The unknown of a body in space is a rotation vector from the predicted attitude; a "
+    cause="The unknown of a body in space is a rotation vector from the predicted attitude; a "
     "change of that vector is a rotation only near zero. With the hinges as constraints, the error "
     "of the linear equations is a gap, which causes loads in the next step. The motion is lost "
     "within a second at steps that are far from long. The tangent operator in the matrices keeps "

@@ -29,7 +29,7 @@ def _normalised_drift(step: float) -> float:
 CASE = CaseDefinition(
     name="quaternion-drift",
     title="Quaternions as four numbers: their length",
-    why="Four numbers for three rotations are constrained by their length, which a method of "
+    cause="Four numbers for three rotations are constrained by their length, which a method of "
     "integration does not preserve. The length decreases per step with the sixth power of the "
     "step, and a quaternion of another length gives no orthonormal axes. Every run normalises "
     "quaternions after each step.",

@@ -15,7 +15,7 @@ ONE_PRODUCT_VARIANT = partial(naive_rotation_vectors.final_attitude, products=1)
 CASE = CaseDefinition(
     name="single-product",
     title="Rotation vectors with one of two products",
-    why="The rate of a rotation vector is the angular velocity plus products of both, each with "
+    cause="The rate of a rotation vector is the angular velocity plus products of both, each with "
     "one more power of the vector. With the first product alone the rate is accurate to third "
     "order within a step, and so is the result: a table of fourth or fifth order gains nothing. "
     "Runs with rotation vectors keep two products, enough for the fifth order of their tables.",

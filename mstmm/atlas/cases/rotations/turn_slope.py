@@ -15,7 +15,7 @@ INCOMPLETE_VARIANT = partial(rotation_vector_rosenbrock.final_attitude, method=T
 CASE = CaseDefinition(
     name="turn-slope",
     title="Rosenbrock steps on rotation vectors: a missing derivative",
-    why="A rotation vector starts every step at zero, where its rate is the angular velocity. "
+    cause="A rotation vector starts every step at zero, where its rate is the angular velocity. "
     "The derivative of that rate by the vector, however, is half a product that does not vanish "
     "there. Without it in the tangent matrix all tables fall to second order. Runs include it.",
     parameter="length of a step",

@@ -37,7 +37,7 @@ def _error(velocity: float, method: str) -> float:
 CASE = CaseDefinition(
     name="friction-steps",
     title="Linearised friction: a body that sticks and slips",
-    why="Rosenbrock methods linearise friction at the start of a step. A body that sticks has a "
+    cause="Rosenbrock methods linearise friction at the start of a step. A body that sticks has a "
     "slope there that vanishes as soon as it slips, but the step keeps it: the body sticks too "
     "long. Methods that iterate evaluate friction at the end of the step, until their iteration "
     "does not converge across the bend; then they report it.",

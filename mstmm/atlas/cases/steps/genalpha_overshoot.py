@@ -16,7 +16,7 @@ def _overshoot(rate: float, method: str) -> float:
 CASE = CaseDefinition(
     name="genalpha-overshoot",
     title="Generalised-alpha: speeds after a stretched spring",
-    why="Displacements do not overshoot, but speeds do, in proportion to step times frequency: "
+    cause="Displacements do not overshoot, but speeds do, in proportion to step times frequency: "
     "the step extrapolates the acceleration of a stretched spring. Start from an equilibrium, "
     "resolve the vibration, or use a method that carries no accelerations over.",
     parameter="step times angular frequency", unit="", low=0.1, high=1e5, scale=LOG_SCALE,

@@ -19,7 +19,7 @@ def _relative_energy(stiffness: float, method: str) -> float:
 CASE = CaseDefinition(
     name="iterated-steps",
     title="Iterated steps: a stiff spring with much energy",
-    why="Generalised-alpha carries the accelerations of the start over. Those of a stretched "
+    cause="Generalised-alpha carries the accelerations of the start over. Those of a stretched "
     "spring may be thousands of times those of the motion, and then even converged steps give the "
     "bodies a wrong motion. Rodas4P2 is L-stable in every stage: it damps the unresolved "
     "vibration, and with it the energy of the spring.",

@@ -7,7 +7,7 @@ import numpy as np
 from ...case_definition import CaseDefinition, MethodDefinition
 from ...error_measures import STEP, relative_amplitudes
 from ...parameter_scale import LOG_SCALE
-from ...shared_scenes import RELEASE_ANGLE, sprung_rod, stiffness_for_frequency
+from ...shared_scenes import RELEASE_ANGLE, rod_with_spring, stiffness_for_frequency
 from ...variants import ros3p
 from ...variants.bare_rosenbrock import BareRosenbrock
 
@@ -17,8 +17,8 @@ RATE = 1e4
 
 def _remaining_ros3p(steps: float) -> float:
     count, rate = max(1, round(steps)), RATE / STEP
-    rod = sprung_rod(stiffness_for_frequency(rate))
-    q, u, _ = BareRosenbrock(rod, ros3p.tableau()).fixed(STEP, count)[-1]
+    rod = rod_with_spring(stiffness_for_frequency(rate))
+    q, u, _ = BareRosenbrock(rod, ros3p.tableau()).fixed_step_states(STEP, count)[-1]
     return float(np.hypot(q[0], u[0] / rate) / RELEASE_ANGLE)
 
 
@@ -29,7 +29,7 @@ def _remaining_rodas4p2(steps: float) -> float:
 CASE = CaseDefinition(
     name="lasting-vibration",
     title="A-stable but not L-stable: unresolved vibration remains",
-    why="A method may be stable for any stiffness and still keep most of a vibration far too "
+    cause="A method may be stable for any stiffness and still keep most of a vibration far too "
     "fast for its steps. This one keeps three quarters of it per step, and over about the first "
     "ten steps the vibration hides all other motion. The methods of a run keep next to nothing "
     "(they are L-stable, or damp by a chosen radius).",

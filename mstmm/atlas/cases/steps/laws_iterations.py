@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ....runtime.integrate.methods import Implicit
 from ...case_definition import CaseDefinition, MethodDefinition
 from ...error_measures import simulate_to_end
 from ...parameter_scale import LOG_SCALE
@@ -17,7 +18,8 @@ def _iterations_with_laws(rate: float) -> float:
 
 
 def _iterations_with_choice(rate: float) -> float:
-    run = simulate_to_end(hanging_rod(rate / STEP), STEPS * STEP, "newmark", STEP, tangent="laws")
+    method = Implicit("newmark", tangent="laws")
+    run = simulate_to_end(hanging_rod(rate / STEP), STEPS * STEP, method, STEP)
     statistics = run.statistics
     assert statistics is not None
     return statistics.iterations / statistics.steps
@@ -26,7 +28,7 @@ def _iterations_with_choice(rate: float) -> float:
 CASE = CaseDefinition(
     name="laws-iterations",
     title="Iteration with hinge laws only: stiffness due to loads",
-    why="Where a tangent matrix neglects weight, spin and preload, every iteration leaves a "
+    cause="Where a tangent matrix neglects weight, spin and preload, every iteration leaves a "
     "quarter of (step times frequency) squared of the error: from 2 on it diverges. Runs start "
     "with the derivatives of hinge laws, which cost little, observe the convergence of the "
     "iteration, and use the exact tangent where it is slow.",

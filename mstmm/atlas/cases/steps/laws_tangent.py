@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ....runtime.integrate.methods import Implicit
 from ...case_definition import CaseDefinition, MethodDefinition
 from ...error_measures import relative_growth
 from ...parameter_scale import LOG_SCALE
@@ -12,13 +13,14 @@ STEP, STEPS = 0.01, 400
 
 def _growth(rate: float, tangent: str) -> float:
     """`rate` is the step times the angular frequency of the rod."""
-    return relative_growth(hanging_rod(rate / STEP), STEP, STEPS, "ros34pw2", tangent=tangent)
+    method = Implicit("ros34pw2", tangent=tangent)
+    return relative_growth(hanging_rod(rate / STEP), STEP, STEPS, method)
 
 
 CASE = CaseDefinition(
     name="laws-tangent",
     title="Tangent of hinge laws only: stiffness due to loads",
-    why="Weight, spin and preload make a motion stiff without any spring. A linearisation with "
+    cause="Weight, spin and preload make a motion stiff without any spring. A linearisation with "
     "the derivatives of springs and dampers only does not include that stiffness; a Rosenbrock "
     "method is then explicit in that direction. The exact tangent includes it.",
     parameter="step times angular frequency of a hanging rod",

@@ -33,7 +33,7 @@ def _error(width: float, switched: bool) -> float:
 CASE = CaseDefinition(
     name="narrow-pulse",
     title="Narrow pulses between the stages of a step",
-    why="A method evaluates a force only at the stages of its steps. In a uniform motion steps "
+    cause="A method evaluates a force only at the stages of its steps. In a uniform motion steps "
     "grow, and a smooth force that is narrow along the motion may be missed with all its work, "
     "while every estimated error is zero. Written with a comparison, the same force is located "
     "however narrow it is; max_step helps as well, at a cost.",

@@ -19,7 +19,7 @@ def _lost_amplitude(rate: float, method: str) -> float:
 CASE = CaseDefinition(
     name="numerical-damping",
     title="Numerical damping of a wanted vibration",
-    why="Implicit methods damp fast vibration, but a wanted one too, with a power of step times "
+    cause="Implicit methods damp fast vibration, but a wanted one too, with a power of step times "
     "frequency that is one above the order of the method. A higher order keeps the vibration "
     "longer. Generalised-alpha with radius 1 keeps all of it, with a period too long and no "
     "damping of fast motion; exprb32 follows it exactly.",

@@ -18,9 +18,9 @@ def _error(step: float, use_old: bool) -> float:
     step = T_END / steps
     exact = simulate_to_end(rods, T_END, rtol=1e-12, atol=1e-14, output_times=[T_END]).q[-1]
     if use_old:
-        angles = BareRosenbrock(rods, "rodas5p", accelerations=np.zeros(2)).fixed(step, steps)[
-            -1, 0
-        ]
+        angles = BareRosenbrock(rods, "rodas5p", accelerations=np.zeros(2)).fixed_step_states(
+            step, steps
+        )[-1, 0]
     else:
         angles = simulate_to_end(rods, T_END, "rodas5p", step, output_times=[T_END]).q[-1]
     return float(np.abs(angles - exact).max())
@@ -29,7 +29,7 @@ def _error(step: float, use_old: bool) -> float:
 CASE = CaseDefinition(
     name="old-accelerations",
     title="Accelerations from before an event: rods that are released",
-    why="Steps with accelerations as unknowns start from those of the step before. After a "
+    cause="Steps with accelerations as unknowns start from those of the step before. After a "
     "release, an impact or a sudden load these belong to other equations: the tangent is that of a "
     "wrong state. The first step then has a lasting error of lower order. Here two rods are "
     "released whose accelerations were zero before. One evaluation corrects them; every run makes "

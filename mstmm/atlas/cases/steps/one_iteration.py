@@ -19,7 +19,7 @@ def _relative_energy(stiffness: float, method: str) -> float:
 CASE = CaseDefinition(
     name="one-iteration",
     title="One linearised equation per step: an unresolved stiff motion",
-    why="Where a bushing is stretched at the start, its end moves far within a step, and an "
+    cause="Where a bushing is stretched at the start, its end moves far within a step, and an "
     "expansion about the predicted motion is inaccurate: the energy grows without a source. "
     "Iterating to convergence, the remedy, holds as long as the iteration converges.",
     parameter="stiffness of bushings (stretched by 1 mm)",

@@ -35,7 +35,7 @@ def _error(stiffness: float, method: str) -> float:
 CASE = CaseDefinition(
     name="order-reduction",
     title="Order reduction: a stiff spring moved by a drive",
-    why="Where a stiff spring is moved from outside, the error of a stage is that of the moved "
+    cause="Where a stiff spring is moved from outside, the error of a stage is that of the moved "
     "base and not that of the motion. The table of fourth order is of second order here, and its "
     "error in the spring load a hundred times larger. Tables made for this case, such as Rodas4P2, "
     "keep their order.",

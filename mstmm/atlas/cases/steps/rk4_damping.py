@@ -5,19 +5,19 @@ from __future__ import annotations
 from ...case_definition import CaseDefinition, MethodDefinition
 from ...error_measures import relative_growth
 from ...parameter_scale import LOG_SCALE
-from ...shared_scenes import sprung_rod
+from ...shared_scenes import rod_with_spring
 
 STIFFNESS, STEP, STEPS = 100.0, 1e-3, 400
 
 
 def _growth(damping: float, method: str) -> float:
-    return relative_growth(sprung_rod(STIFFNESS, damping), STEP, STEPS, method)
+    return relative_growth(rod_with_spring(STIFFNESS, damping), STEP, STEPS, method)
 
 
 CASE = CaseDefinition(
     name="rk4-damping",
     title="Explicit steps: strength of a damper",
-    why="A strong damper stops a motion within a time that is unrelated to the motion that "
+    cause="A strong damper stops a motion within a time that is unrelated to the motion that "
     "follows. Explicit steps must still be shorter than 2.785 times that time, or they are "
     "unstable; implicit ones need not resolve it.",
     parameter="damping of a rod's pin", unit="N m s/rad", low=1.0, high=1e8, scale=LOG_SCALE,

@@ -27,7 +27,7 @@ def _deflection(shapes: float, method: str) -> float:
 CASE = CaseDefinition(
     name="rk4-shapes",
     title="Explicit steps: number of shapes of a beam",
-    why="Frequencies of shapes grow with the square of their number, and an explicit step must "
+    cause="Frequencies of shapes grow with the square of their number, and an explicit step must "
     "resolve the highest, even if the motion is that of the first. Use few suitable shapes, or "
     "implicit steps, which damp what they do not resolve.",
     parameter="shapes of a clamped beam", unit="", low=1, high=20, scale=COUNT_SCALE,

@@ -5,19 +5,19 @@ from __future__ import annotations
 from ...case_definition import CaseDefinition, MethodDefinition
 from ...error_measures import relative_growth
 from ...parameter_scale import LOG_SCALE
-from ...shared_scenes import sprung_rod
+from ...shared_scenes import rod_with_spring
 
 STEP, STEPS = 1e-3, 400
 
 
 def _growth(stiffness: float, method: str) -> float:
-    return relative_growth(sprung_rod(stiffness), STEP, STEPS, method)
+    return relative_growth(rod_with_spring(stiffness), STEP, STEPS, method)
 
 
 CASE = CaseDefinition(
     name="rk4-stiffness",
     title="Explicit steps: stiffness of a spring",
-    why="An explicit step must resolve the fastest vibration whether it is wanted or not. The "
+    cause="An explicit step must resolve the fastest vibration whether it is wanted or not. The "
     "classical Runge-Kutta method is stable as long as the step times its angular frequency is "
     "below the square root of 8. Implicit steps stay bounded for any stiffness (for the accuracy "
     "of the vibration see numerical-damping).",

@@ -39,14 +39,16 @@ def _error(rate: float, time_slope: bool) -> float:
     if time_slope:
         displacement = simulate_to_end(car, TIMES[-1], "rodas4", STEP, output_times=TIMES).q[:, 0]
     else:
-        displacement = BareRosenbrock(car, "rodas4", time_slope=False).fixed(STEP, STEPS)[:, 0, 0]
+        displacement = BareRosenbrock(car, "rodas4", time_slope=False).fixed_step_states(
+            STEP, STEPS
+        )[:, 0, 0]
     return float(np.abs(displacement - exact).max() / WAVE_HEIGHT)
 
 
 CASE = CaseDefinition(
     name="time-slope",
     title="Rosenbrock steps without the time derivative: a road",
-    why="A linearised step needs the time derivative of the equations, as it needs the tangent "
+    cause="A linearised step needs the time derivative of the equations, as it needs the tangent "
     "matrix for the coordinates. Where drives, roads or loads depend on time and that derivative "
     "is left out, the table is of first order. Runs include it; tables of W-methods, such as "
     "ROS34PW2, do not need it.",

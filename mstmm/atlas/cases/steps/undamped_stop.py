@@ -37,7 +37,7 @@ def _rebound(rate: float, fixed_step: bool) -> float:
 CASE = CaseDefinition(
     name="undamped-stop",
     title="Fixed steps across a stop without damping",
-    why="A stop is a spring that starts suddenly. The contact occurs within a step, but the step "
+    cause="A stop is a spring that starts suddenly. The contact occurs within a step, but the step "
     "assumes it from its start or its end on, so that the rebound has another energy than the "
     "approach. It is larger or smaller depending on the position within the step, and more so the "
     "stiffer the stop. Steps with error control shrink until the contact is resolved.",

@@ -42,7 +42,7 @@ def _error(rate: float, fixed_step: bool) -> float:
 CASE = CaseDefinition(
     name="unstable-motion",
     title="Implicit steps: an unstable motion",
-    why="Implicit steps damp fast motion, including fast growth. For an inverted or buckled body "
+    cause="Implicit steps damp fast motion, including fast growth. For an inverted or buckled body "
     "a step of half the time constant of growth is inaccurate. At twice that time the matrix of "
     "the step changes its sign: the run reports this and ends. The error of the step shows it, but "
     "fixed steps do not use it.",

@@ -16,7 +16,7 @@ def _overshoot(rate: float, method: str) -> float:
 CASE = CaseDefinition(
     name="wilson-overshoot",
     title="Wilson's method: overshoot in the first steps",
-    why="Wilson's method carries accelerations over and collocates after the end of the step. It "
+    cause="Wilson's method carries accelerations over and collocates after the end of the step. It "
     "is stable for any step, but in its first steps a stretched spring overshoots with the square "
     "of step times frequency. Nothing diverges, and still the results of the first instants are "
     "wrong by any factor. L-stable Rosenbrock methods damp the vibration at once.",

@@ -26,7 +26,7 @@ def error(ratio: float, sweep: str) -> float:
 CASE = CaseDefinition(
     name="heavy-tip",
     title="Riccati sweep: a heavy body outboard of light ones",
-    why="The sweep subtracts from the inertia that a hinge carries the part that moves freely in "
+    cause="The sweep subtracts from the inertia that a hinge carries the part that moves freely in "
     "the hinge. Three hinges inboard of a heavy tip, in a plane, only rounding is left of its "
     "inertia, next to the inertia of light links. Least squares carry rows, whose sums of squares "
     "are both inertias: rotations combine them without a difference.",

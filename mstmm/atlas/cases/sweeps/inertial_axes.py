@@ -80,7 +80,7 @@ def _error(rods: float, inertial: bool) -> float:
 CASE = CaseDefinition(
     name="inertial-axes",
     title="Sweep in inertial axes: length of an oblique chain",
-    why="The inertia of a planar chain against motions out of its plane grows with the cube of "
+    cause="The inertia of a planar chain against motions out of its plane grows with the cube of "
     "its length. In axes oblique to that plane every entry of the inertia mixes that large part "
     "with the small one that moves. Rounding of the large part then disturbs the small one. In "
     "axes along the hinges, which the engines choose whatever the axes of a scene, the two are "

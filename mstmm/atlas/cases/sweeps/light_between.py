@@ -54,7 +54,7 @@ def _rate_by_iterations(model: Model) -> float:
 CASE = CaseDefinition(
     name="light-between",
     title="Fastest motion by pivots: a light body between heavy ones",
-    why="The sweep divides by the inertia D that a hinge moves outboard of it. The stiffness "
+    cause="The sweep divides by the inertia D that a hinge moves outboard of it. The stiffness "
     "over D is no squared frequency, because the inboard side moves too. Where the inboard side is "
     "light and softly supported, it is the part that vibrates. Explicit steps chosen by k/D are "
     "then too long by the root of the mass ratio. A few power iterations with M^-1, each two "

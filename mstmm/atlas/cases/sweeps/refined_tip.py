@@ -19,7 +19,7 @@ def _refined_error(ratio: float) -> float:
 CASE = CaseDefinition(
     name="refined-tip",
     title="Refined sweep: a heavy body outboard of light ones",
-    why="Inverse dynamics eliminates nothing: the residual that it gives for the accelerations "
+    cause="Inverse dynamics eliminates nothing: the residual that it gives for the accelerations "
     "is accurate. The sweep solves for it with the digits that it has, so that each refinement "
     "reduces the error by the relative error of the sweep. Up to four are made, as many as the "
     "start needs. Where the sweep has no accurate digit, refinement fails.",

@@ -47,7 +47,7 @@ def _error(ratio: float, foot: dict[str, Any], state: tuple[Array, Array]) -> fl
 CASE = CaseDefinition(
     name="thin-rod",
     title="Riccati sweep: a hinge that rotates a body without inertia",
-    why="The sweep divides by the inertia D of the free motions of a hinge. A ball lets a rod "
+    cause="The sweep divides by the inertia D of the free motions of a hinge. A ball lets a rod "
     "spin about its axis, where there is hardly any inertia. In axes oblique to the rod that "
     "inertia is the difference of large entries: the spin is rounding over rounding. Below 1e-14 "
     "of the mean a pivot of D counts as zero, and the run stops and names the hinge. A motion "

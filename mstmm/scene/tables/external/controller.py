@@ -107,7 +107,7 @@ class Controller(Table):
         return self
 
     @cached_property
-    def filled(self) -> dict[str, Numbers]:
+    def complete_matrices(self) -> dict[str, Numbers]:
         """Matrices, flat row by row, and vectors by key, with zeros where nothing is given."""
         n, n_y, n_u = len(self.A), len(self.inputs), len(self.outputs)
         sizes = {"A": n * n, "B": n * n_y, "C": n_u * n, "D": n_u * n_y,

@@ -78,7 +78,7 @@ class Names(Table):
         """Hinge with this name in other programs, else the name itself."""
         return _replace_known_prefix(name, self.hinge)
 
-    def meant(self, name: str) -> Iterator[str]:
+    def resolve(self, name: str) -> Iterator[str]:
         """Possible meanings of the name of a quantity or parameter.
 
         First the name itself, then with names of other programs replaced by those of the scene.

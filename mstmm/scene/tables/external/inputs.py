@@ -116,13 +116,13 @@ class Signal(Table):
     column: Annotated[str | int | None, _column_rule()] = None
 
     @model_validator(mode="after")
-    def _settle(self) -> Signal:
+    def _load_samples(self) -> Signal:
         if self.file is not None:
             self._read()
         elif self.column is not None:
             raise problem("only a signal from a file has a column; leave it out", "column")
         else:
-            self._in_order([f"times[{k}]" for k in range(len(self.times))], "times")
+            self._check_order([f"times[{k}]" for k in range(len(self.times))], "times")
         return self
 
     def _read(self) -> None:
@@ -135,13 +135,13 @@ class Signal(Table):
             raise problem(str(refused), "file") from None
         object.__setattr__(self, "times", columns.first)
         object.__setattr__(self, "values", columns.other)
-        self._in_order(
+        self._check_order(
             [f"{describe_value(self.file)} row {line}" for line in columns.lines], "file"
         )
         object.__setattr__(self, "file", None)
         object.__setattr__(self, "column", None)
 
-    def _in_order(self, rows: list[str], place: str) -> None:
+    def _check_order(self, rows: list[str], place: str) -> None:
         """Check that times ascend and rates are finite.  Raises Refused with the rows."""
         if not self.times:
             raise problem("missing; expected times in s and values, or a file with them", place)

@@ -1,0 +1,1 @@
+"""Tests: `mstmm`, `derive` and `runtime` mirror the product file by file."""

@@ -1,1 +1,0 @@
-"""Closed loops that flexible bodies are part of."""

@@ -1,1 +1,0 @@
-"""Implicit steps on closed loops."""

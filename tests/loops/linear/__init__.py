@@ -1,1 +1,0 @@
-"""Linear models of closed loops: motions of drives, and states that move."""

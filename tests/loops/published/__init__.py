@@ -1,1 +1,0 @@
-"""Mechanisms with closed loops that others have published."""

@@ -1,1 +1,0 @@
-"""Where closed loops begin: assembly, and wishes that cannot be met."""

@@ -1,1 +1,0 @@
-"""Tests of robots read from the formats of others."""

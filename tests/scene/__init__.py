@@ -1,1 +1,0 @@
-"""Tests of scenes, expressions and the tree."""
