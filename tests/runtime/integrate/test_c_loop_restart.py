@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -115,7 +116,7 @@ def test_another_process_continues_bit_for_bit(lab: Lab, tmp_path: Path) -> None
     paths = [str(ROOT), *sys.path]
     done = subprocess.run(
         [sys.executable, "-c", CONTINUE, str(tmp_path), str(lab.path.parent)],
-        env={"PYTHONPATH": ":".join(filter(None, paths)), "PATH": "/usr/bin:/bin"},
+        env={**os.environ, "PYTHONPATH": ":".join(filter(None, paths))},
         capture_output=True,
         text=True,
         check=False,
