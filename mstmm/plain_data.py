@@ -31,6 +31,8 @@ def to_plain(value: Any) -> Any:
 
 
 def from_plain(cls: type[T], data: Mapping[str, Any]) -> T:
-    """Create a flat dataclass from its dictionary.  KeyError for unknown, TypeError for missing."""
+    """Create a flat dataclass from its dictionary.  TypeError for unknown and missing keys."""
     names = {key: name for name, key in stored_keys(cls).items()}
+    if unknown := data.keys() - names.keys():
+        raise TypeError(f"{cls.__name__}: unknown key {min(unknown)!r}")
     return cls(**{names[key]: value for key, value in data.items()})

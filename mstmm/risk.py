@@ -56,9 +56,9 @@ class Risk:
         return f"{self.description}; {self.remedy}"
 
 
-def information(name: str, element: str, means: str, remedy: str) -> Risk:
+def information(name: str, element: str, description: str, remedy: str) -> Risk:
     """Create a risk that is information, no objection to the numbers."""
-    return Risk(name, element, means, remedy, invalidates=False)
+    return Risk(name, element, description, remedy, invalidates=False)
 
 
 def sentences(risks: Iterable[Risk]) -> tuple[str, ...]:

@@ -1,7 +1,7 @@
 """Runs the tests of the files given, or of what differs from the last commit.
 
     python -m tests.changed                              # the changed tree
-    python -m tests.changed runtime/linear/modes.py -x   # one file; options go to pytest
+    python -m tests.changed runtime/linear/modes.py -x   # one file; from an option on, pytest's
 
 A file without a test of its own runs the tests of its folder.  What other packages do with it is
 tested by the whole suite alone.
@@ -11,7 +11,8 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Iterable
+from collections.abc import Sequence
+from itertools import takewhile
 from pathlib import Path
 
 import pytest
@@ -46,10 +47,10 @@ def changed_files() -> list[Path]:
     return [Path(name) for result in lines for name in result.stdout.splitlines()]
 
 
-def main(arguments: Iterable[str]) -> int:
+def main(arguments: Sequence[str]) -> int:
     """Run pytest on the tests of the files among the arguments; its exit status."""
-    options = [text for text in arguments if text.startswith("-")]
-    names = [text for text in arguments if not text.startswith("-")]
+    names = list(takewhile(lambda text: not text.startswith("-"), arguments))
+    options = arguments[len(names) :]
     paths = [Path(name).resolve().relative_to(ROOT) for name in names] or changed_files()
     targets = sorted({str(found) for path in paths for found in find_tests(path)})
     if not targets:

@@ -153,8 +153,7 @@ def _chained_function(group: ChainedPasses) -> str:
             f"{call_text}        }}\n"
         )
     return (
-        f"{fetches}"
-        f"static int {group.function}(mstmm_state *state)\n{{\n"
+        f"{fetches}static int {group.function}(mstmm_state *state)\n{{\n"
         "    const mstmm_model *model = state->model;\n"
         f"    int code{counters};\n"
         "    for (int first = 0; first < model->n_bodies; first += MSTMM_TILE) {\n"

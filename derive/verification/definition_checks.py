@@ -54,8 +54,7 @@ def _check_methods(where: str, element: Element) -> None:
         if similar_names:
             raise ElementError(
                 f"{where}: {name} is not a method of a {kind_of(element)}; did you mean "
-                f"{similar_names[0]}? "
-                "(begin the names of your own methods with _)"
+                f"{similar_names[0]}? (begin the names of your own methods with _)"
             )
 
 
@@ -68,8 +67,7 @@ def _check_names(element: Element) -> None:
     if not name.isidentifier() or not name.isascii() or len(name) > _MAX_NAME_LENGTH:
         raise ElementError(
             f"{name!r:.80} is not a name: at most {_MAX_NAME_LENGTH} letters, digits and "
-            f"underscores, "
-            "starting with a letter"
+            "underscores, starting with a letter"
         )
     location = f"{kind_of(element)} {name}"
     for built_in in builtin_elements():
@@ -287,8 +285,7 @@ def _check_rank(where: str, motion: HingeMotion, point: Numbers) -> None:
         rank = sum(1 for s in singular if s > singular[0] * mpmath.mpf(10) ** -12)
         if rank < motion.nu:
             raise ElementError(
-                f"{where}: the {motion.nu} speeds give only "
-                f"{rank} independent "
+                f"{where}: the {motion.nu} speeds give only {rank} independent "
                 "motions (the motion subspace H loses rank); remove a coordinate, or let rotation "
                 "and position depend on every one of them"
             )

@@ -267,8 +267,7 @@ def _test_pendulum(compiled: Compile, engine: str) -> str:
     if not (acceleration_error <= 1e-13 and drift <= 1e-7):
         raise EnvironmentFailure(
             f"a pendulum differs from its closed form by {acceleration_error:.1e} (accelerations) "
-            f"and "
-            f"{drift:.1e} rad (after a period); reinstall mstmm: pip install --force-reinstall "
+            f"and {drift:.1e} rad (after a period); reinstall mstmm: pip install --force-reinstall "
             "mstmm"
         )
     return (

@@ -61,6 +61,5 @@ def _require_common_starts(model: Model, q: Array, u: Array) -> None:
             raise SceneError(
                 f'scene: chain "{hinge.name.partition("[")[0]}": "{hinge.name}" starts at '
                 f"{assembled_values[0]:.9g} once its loop is closed, but members of a chain share "
-                f"their "
-                "start; write them as [[body]] and [[hinge]]"
+                "their start; write them as [[body]] and [[hinge]]"
             )

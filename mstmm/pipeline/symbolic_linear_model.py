@@ -87,8 +87,7 @@ def _require_symbolic(linear: LinearEquations) -> None:
     if linear.drive_indices:
         raise SceneError(
             f"symbolic: the motion of the drive of {linear.prescribed_coordinates[0]} is an "
-            f"input, for which there "
-            "is no symbolic column; remove it from the inputs"
+            "input, for which there is no symbolic column; remove it from the inputs"
         )
     if len(linear) > MAX_COORDINATES:
         raise SceneError(

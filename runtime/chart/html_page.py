@@ -73,8 +73,7 @@ def page(chart: ChartRecord) -> str:
         f'<p class="soft">{escape(_conditions(chart))}</p>',
         f'<p class="soft">Reference: {escape(reference.made_by)}. Its own error is '
         f"{reference.error:.1e}; errors below {reference.smallest_resolved_error:.1e} are not "
-        f"resolved. Scaling: "
-        f"{escape(escape_control_characters(reference.scaling))}.</p>",
+        f"resolved. Scaling: {escape(escape_control_characters(reference.scaling))}.</p>",
         *(f"<p>{escape(escape_control_characters(text))}</p>" for text in _scene_notes(chart)),
         '<div class="chart"><div class="plane">', chart_svg(drawing, keys), "</div>",
         _legend(drawing.legend, keys), "</div>",
@@ -113,8 +112,7 @@ def _conditions(chart: ChartRecord) -> str:
         f"{escape_control_characters(chart.reference.measure)}"
         f"{unit} over {chart.sampling_text}. Time: CPU time of the whole call of simulate, the "
         f"smallest of several. Computed in {chart.elapsed:.0f} s of a budget of {chart.budget:g} "
-        f"s. "
-        "Hover over a point or a name of the legend for details."
+        "s. Hover over a point or a name of the legend for details."
     )
 
 

@@ -69,8 +69,7 @@ def find_nonfinite_derivative(engine: EngineCalls, t: float, q: Array, u: Array)
                     f"{_quote_expression(location, expression)} has no finite derivative "
                     f"with respect to {name.text} at t = {t:.9g} s, which implicit methods need; "
                     "make it smooth there, such as "
-                    "sqrt(abs(u) + 1e-6) for sqrt(abs(u)), or use an explicit method such as "
-                    "dop853"
+                    "sqrt(abs(u) + 1e-6) for sqrt(abs(u)), or use an explicit method such as dop853"
                 )
     return ""
 

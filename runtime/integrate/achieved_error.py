@@ -107,8 +107,7 @@ class AchievedError:
             return f"not known, {_with_unit(self.target, self.unit)} requested"
         return (
             f"{_with_unit(self.estimate, self.unit)} of {self.quantity} "
-            f"({_with_unit(self.target, self.unit)} "
-            f"requested): {self.how}"
+            f"({_with_unit(self.target, self.unit)} requested): {self.how}"
         )
 
 

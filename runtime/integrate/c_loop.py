@@ -573,8 +573,7 @@ def failure_text(
         Status.TOO_MANY_STEPS: f"more steps than allowed {time_text}"
         if not fail.code
         else f"no end in sight {time_text}: with the last step lengths the run would need more "
-        f"than "
-        "1e10 steps; the motion sticks where the right-hand side jumps, or is too "
+        "than 1e10 steps; the motion sticks where the right-hand side jumps, or is too "
         f"{problem} for the tolerance; max_steps, if given, is the only limit",
         Status.TANGENT_FAILED: f"the equations of motion have no regular tangent {time_text} (code "
         f"{fail.code}): the motion may be singular there, or leave an unstable position faster "

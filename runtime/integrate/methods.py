@@ -14,6 +14,7 @@ from typing import Any
 from mstmm.argument_validation import require_word
 from mstmm.errors import SceneError
 
+EXPLICIT = ("rk4", "dopri5", "dop853", "pirk13")
 IMPLICIT = (
     "rodas4", "rodas4p2", "rodas5p", "ros34pw2", "rodas4pw", "esdirk436", "kvaerno5",
     "genalpha", "dttmm", "hht", "newmark", "wilson", "houbolt", "exprb32",

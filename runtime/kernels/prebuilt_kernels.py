@@ -45,8 +45,7 @@ def module() -> tuple[Any, Any]:
     except ImportError as error:
         raise EnvironmentFailure(
             f"the compiled kernels cannot be loaded ({error}); give the process more memory, or "
-            "reinstall mstmm: "
-            "pip install -e . (a C compiler is needed)"
+            "reinstall mstmm: pip install -e . (a C compiler is needed)"
         ) from error
     _check_source_hash(kernels)
     return kernels.ffi, kernels.lib
@@ -77,8 +76,7 @@ def read_element(ffi: Any, descriptor: Any) -> Element:
     if descriptor.abi != abi.ABI_VERSION:
         raise EnvironmentFailure(
             f"element {name!r} was built for layout {descriptor.abi}, this mstmm has "
-            f"{abi.ABI_VERSION}; "
-            "regenerate it: mstmm generate FILE"
+            f"{abi.ABI_VERSION}; regenerate it: mstmm generate FILE"
         )
     functions, guards = {}, {}
     for i in range(descriptor.n_kernels):

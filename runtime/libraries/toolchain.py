@@ -217,6 +217,5 @@ def _failure_text(found: Compiler, ended: ProcessResult, source: str) -> str:
     printable_line = "".join(c if c.isprintable() else " " for c in error_line)[:300]
     return (
         f"the C compiler {program} could not compile {source} (exit code {ended.code}: "
-        f"{printable_line}); "
-        "see mstmm doctor"
+        f"{printable_line}); see mstmm doctor"
     )

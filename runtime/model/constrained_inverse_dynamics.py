@@ -143,7 +143,6 @@ def _check_closed(model: CompiledScene, given: Array, closed: Array) -> None:
         k = free[int(differences.argmax())]
         raise SceneError(
             f"udot of {model.coordinate_layout.u_name(k)} is {given[k]:.6g}, where closed loops "
-            f"need "
-            f"{closed[k]:.6g}; give the accelerations of the independent speeds alone: "
+            f"need {closed[k]:.6g}; give the accelerations of the independent speeds alone: "
             f"{_independent_names(model)}"
         )

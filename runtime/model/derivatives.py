@@ -227,8 +227,7 @@ class Differentiation:
                 state, row, _ = (int(k[0]) for k in np.nonzero(~np.isfinite(array)))
                 raise NumericalFailure(
                     f"the derivative of {self._model.coordinate_layout.u_names[row]}'s "
-                    f"acceleration with "
-                    f"respect to {name} is not finite at t = {t[state, 0]:.9g} s"
+                    f"acceleration with respect to {name} is not finite at t = {t[state, 0]:.9g} s"
                 )
 
     def _rates(self, states: Mapping[str, Array], n: Array) -> tuple[Array, Array]:

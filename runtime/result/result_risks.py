@@ -43,8 +43,7 @@ def output_risks(run: Trajectory, outputs: Mapping[str, Array]) -> Iterator[Risk
                 "not-finite",
                 f'output "{name}"',
                 f'output "{name}" is not finite at {int(is_invalid.sum())} of {len(run.t)} '
-                f"samples, "
-                f"first at t = {first_time:.6g} s",
+                f"samples, first at t = {first_time:.6g} s",
                 "keep divisors and the arguments of roots and logarithms within their range",
             )
 

@@ -37,8 +37,7 @@ def unmapped_expression_notes(packed: PackedScene, settings: Settings) -> tuple[
                 "switches",
                 RUN,
                 f"more than {MAX_SWITCHES} conditions depend on the motion; only the first "
-                f"{MAX_SWITCHES} end a step "
-                "where they switch",
+                f"{MAX_SWITCHES} end a step where they switch",
                 "give max_step so that none is missed",
                 count,
                 MAX_SWITCHES,

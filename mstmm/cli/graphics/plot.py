@@ -57,8 +57,7 @@ def plot(
             "-o",
             metavar="FILE",
             help="Plot file: .png, .svg or .pdf; "
-            "repeatable.  Default: .png with the name of the first result, current "
-            "folder.",
+            "repeatable.  Default: .png with the name of the first result, current folder.",
         ),
     ] = None,
     title: Annotated[
@@ -75,8 +74,7 @@ def plot(
         if Path(name).suffix.lower() not in RESULT_ENDINGS:
             raise MstmmError(
                 f"{quote(name)}: expected a saved result, {', '.join(RESULT_ENDINGS)}; mstmm "
-                f"simulate "
-                "writes them"
+                "simulate writes them"
             )
     targets = [
         output_file(name, PLOT_ENDINGS)

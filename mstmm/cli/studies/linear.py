@@ -166,8 +166,7 @@ def frf(
             metavar="NAME",
             help="Input, such as shoulder.effort, "
             "boom.tip.force.x, ground.acceleration.y, road.displacement of a drive, or a "
-            "scene input; repeatable.  Default: the scene's inputs, else ground "
-            "accelerations.",
+            "scene input; repeatable.  Default: the scene's inputs, else ground accelerations.",
         ),
     ] = None,
     outputs: Annotated[

@@ -47,8 +47,7 @@ def _error_sentences(result: Result) -> Iterator[str]:
     if predictable_until is not None:
         yield (
             f"From t = {predictable_until:.3g} s on accurate runs diverge: later values are one "
-            f"possible "
-            "motion, but no prediction."
+            "possible motion, but no prediction."
         )
     if error is not None or estimate is not None:
         yield f"The error refers to {certificate.error_scope}."

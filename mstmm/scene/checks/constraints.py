@@ -59,8 +59,7 @@ def _curve_problems(
                 yield (
                     (*place, k),
                     f"{describe_value(entry.text)} or one of its first two derivatives is not "
-                    f"finite at "
-                    f"s = {start:g}; set start to another value",
+                    f"finite at s = {start:g}; set start to another value",
                 )
     if len(derivatives) == len(curve) and not any(derivatives):
         yield place, f"all derivatives are 0 at s = {start:g}; set start to another value"

@@ -160,14 +160,12 @@ def _derivative_message(scene: SceneTables, row: Expression, kept: Collection[Na
     if not all(map(math.isfinite, (row.evaluate(start_values.__getitem__), *derivatives.values()))):
         return (
             f"the expression or one of its derivatives is not finite at the start ({start_text}); "
-            f"use "
-            "another initial state"
+            "use another initial state"
         )
     if not any(derivatives[name] for name in kept):
         return (
             f"all derivatives are 0 at the start ({start_text}), so the direction of motion is "
-            f"undefined; "
-            "use another initial state, or an expression without the square"
+            "undefined; use another initial state, or an expression without the square"
         )
     return None
 

@@ -84,8 +84,7 @@ def spin_problems(scene: SceneTables) -> Iterator[Problem]:
             yield (
                 ("beam", i, "polar_inertia_per_length"),
                 f'missing; hinge "{beam_hinges[0].name}" allows the beam to spin about its axis, '
-                f"about "
-                "which it has no inertia; expected rho I_p in kg m, more than 0, or "
+                "about which it has no inertia; expected rho I_p in kg m, more than 0, or "
                 "rotary_inertia, or another hinge",
             )
 

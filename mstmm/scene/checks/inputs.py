@@ -148,15 +148,13 @@ def drive_problems(scene: SceneTables) -> Iterator[Problem]:
                 yield (
                     entry_location,
                     f"a drive cannot switch with an input, found {switching_text!r}; give the "
-                    f"whole motion "
-                    "in the input",
+                    "whole motion in the input",
                 )
             elif rateless_names:
                 yield (
                     entry_location,
                     f"a drive needs the rates of the input {rateless_names[0]!r}; give them "
-                    f"there, as in "
-                    "rates = [0, 0], or use a signal as its value",
+                    "there, as in rates = [0, 0], or use a signal as its value",
                 )
             else:
                 yield from _start_problems(scene, entry, entry_location)
@@ -189,8 +187,7 @@ def _start_problems(scene: SceneTables, entry: Expression, at: Location) -> Iter
         yield (
             at,
             f"{describe_value(entry.text)} or one of its first two derivatives is not finite at t "
-            f"= 0; "
-            "start with a smooth motion",
+            "= 0; start with a smooth motion",
         )
 
 

@@ -49,8 +49,7 @@ def check_included_files(content: bytes, path: Path, where: str) -> Locations:
             if element_count > MAX_ELEMENT_COUNT:
                 raise SceneError(
                     f"{element.where}: <{element.tag}>: the model has more than "
-                    f"{MAX_ELEMENT_COUNT} elements "
-                    "including copies; leave some out"
+                    f"{MAX_ELEMENT_COUNT} elements including copies; leave some out"
                 )
             folders.update(
                 element.attributes[key] for key in _FOLDER_KEYS if key in element.attributes

@@ -30,8 +30,7 @@ def check_element(element: Element) -> None:
     if size > _MAX_STORED_NUMBERS:
         raise SceneError(
             f"{element.where}: <{element.tag}>: expected at most {_MAX_STORED_NUMBERS} numbers, "
-            f"found "
-            f"{size}; make it coarser, or leave it out"
+            f"found {size}; make it coarser, or leave it out"
         )
 
 

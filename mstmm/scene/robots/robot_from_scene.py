@@ -298,8 +298,7 @@ def _loop_message(scene: Scene, cut: Sequence[Hinge]) -> str:
     )
     return (
         f"{loop_text}, which URDF does not support: {inboard_text}; leave out hinges until each "
-        f"body has "
-        "one inboard hinge, and keep the bodies"
+        "body has one inboard hinge, and keep the bodies"
     )
 
 

@@ -80,8 +80,7 @@ def _section_problems(beam: BeamKeys) -> Iterator[Problem]:
         yield (
             ("section", len(beam.section) - 1, "to"),
             f"expected the length of the beam, {beam.length:g} m, found {covered_length:g}; "
-            f"correct the "
-            "end of the last piece, or length",
+            "correct the end of the last piece, or length",
         )
 
 
@@ -259,15 +258,13 @@ def _end_problems(beam: BeamKeys) -> Iterator[Problem]:
             yield (
                 location,
                 f"expected a point on the axis of the beam, found {describe_value(end.position)}; "
-                f"connect "
-                "an offset end by a rigid body on a fixed hinge",
+                "connect an offset end by a rigid body on a fixed hinge",
             )
         elif fixed_position is not None and abs(x - fixed_position) > tolerance:
             yield (
                 location,
                 f'expected {fixed_position:g} m, the position of "{name}" on every beam, found '
-                f"{x:g}; "
-                "choose another name",
+                f"{x:g}; choose another name",
             )
         elif not -tolerance <= x <= beam.length + tolerance:
             yield (
@@ -279,8 +276,7 @@ def _end_problems(beam: BeamKeys) -> Iterator[Problem]:
         yield (
             ("frame",),
             f'there is no end "{frame_end}"{did_you_mean(frame_end, beam.ends)}; define a section '
-            f"as an end, as in "
-            f"ends = {{ {frame_end} = {beam.length / 2:g} }}",
+            f"as an end, as in ends = {{ {frame_end} = {beam.length / 2:g} }}",
         )
 
 

@@ -206,8 +206,7 @@ def _resolve_law(
             (
                 ("law", "limits"),
                 f"the rates of {hinge_with_article(kind.name)} are not its speeds, which a hard "
-                f"stop reverses; "
-                "give the stop a stiffness instead of a restitution",
+                "stop reverses; give the stop a stiffness instead of a restitution",
             )
         )
     return law.model_copy(update=changes)

@@ -85,8 +85,7 @@ class Load(Table):
         if end:
             raise problem(
                 f'"{MASS_CENTER}" needs a body without an end, found on = '
-                f"{describe_value(self.on)}; "
-                f"write on = {describe_value(body)}, or leave `at` out",
+                f"{describe_value(self.on)}; write on = {describe_value(body)}, or leave `at` out",
                 "at",
             )
         if self.force_per_length is not None:

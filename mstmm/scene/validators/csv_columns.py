@@ -46,8 +46,7 @@ def read_columns(path: str, folder: str, column: str | int) -> Columns:
         if len(cells) <= column_index:
             raise problem(
                 f"{describe_value(path)}: row {line}: expected {column_index + 1} columns or "
-                f"more, found "
-                f"{len(cells)}"
+                f"more, found {len(cells)}"
             )
         for cell, numbers in ((cells[0], first_column), (cells[column_index], second_column)):
             value = _parse_number(cell)
@@ -92,8 +91,7 @@ def _read_text(path: str, folder: str) -> str:
     if Path(path).is_absolute() or not file_path.is_relative_to(folder_path):
         raise problem(
             f"expected a file in the folder of the scene, found {describe_value(path)}; copy it "
-            f"there, or "
-            "give its numbers as times and values"
+            "there, or give its numbers as times and values"
         )
     try:
         if not file_path.is_file():

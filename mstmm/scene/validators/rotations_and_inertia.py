@@ -149,8 +149,7 @@ def _entries_of_symmetric(matrix: Matrix) -> Numbers:
         if not abs(upper - lower) <= _MAX_RELATIVE_ROUNDING * largest:
             raise problem(
                 f"expected a symmetric tensor, found {describe_value(upper)} at [{i}][{j}] and "
-                f"{describe_value(lower)} "
-                f"at [{j}][{i}]"
+                f"{describe_value(lower)} at [{j}][{i}]"
             )
         return upper if upper == lower else (upper + lower) / 2
 

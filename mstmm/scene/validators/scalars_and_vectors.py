@@ -318,8 +318,7 @@ def vector_rule(of: str) -> Rule:
             if abs(entry) > MAX_ENTRY:
                 raise problem(
                     f"expected a number{_unit_text(of)} of absolute value {MAX_ENTRY:g} or less, "
-                    f"found "
-                    f"{describe_value(entry)}, whose square overflows",
+                    f"found {describe_value(entry)}, whose square overflows",
                     i,
                 )
         return result

@@ -133,8 +133,7 @@ def check_conservative(given: Triangle, what: str) -> None:
         i, j = pair
         raise problem(
             f"expected a symmetric matrix, found {describe_value(given[6 * i + j])} at [{i}][{j}] "
-            f"and "
-            f"{describe_value(given[6 * j + i])} at [{j}][{i}]; a matrix that is not symmetric "
+            f"and {describe_value(given[6 * j + i])} at [{j}][{i}]; a matrix that is not symmetric "
             f"has no "
             "potential: set conservative = false if that is intended, as for a journal bearing",
             what,

@@ -188,8 +188,7 @@ def _skew_text(skews: list[_Skew]) -> str:
             f'the axis of hinge "{hinge.name}" is {angle_text} from parallel to those of '
             f'"{neighbour_names[0]}" '
             f'and "{neighbour_names[1]}" next to it in the loop; make it parallel by an exact '
-            f"axis and "
-            "orientation, or replace it by a ball hinge"
+            "axis and orientation, or replace it by a ball hinge"
         )
     first_hinge, second_hinge = worst.hinges
     location = "ground" if worst.body == "ground" else f'body "{worst.body}"'

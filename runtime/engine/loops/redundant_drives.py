@@ -86,6 +86,5 @@ def _redundant_drives_text(names: list[str], drives: int, surplus: int) -> str:
     omitted_text = "one" if surplus == 1 else "all but one" if is_single_freedom else "some"
     return (
         f"the drives of hinges {drive_names} move {freedom_text} of the mechanism; omit "
-        f"{omitted_text} of these drives, "
-        "or replace a hinge of the loop by a compliant [[bushing]]"
+        f"{omitted_text} of these drives, or replace a hinge of the loop by a compliant [[bushing]]"
     )

@@ -2,8 +2,8 @@
 
 A new method is one file with a function `tableau() -> Tableau`: `Tableau` itself for an explicit
 Runge-Kutta method, a class of `implicit_methods` for an implicit one.  Inside the package its
-module name is added to `EXPLICIT` or to `methods.IMPLICIT`, and to the lists of its properties
-beside them; outside it, call `register(my_tableau())` before the run.  The C loop reads the
+module name is added to `EXPLICIT` or `IMPLICIT` in `methods.py`, and to the lists of its
+properties; outside it, call `register(my_tableau())` before the run.  The C loop reads the
 coefficients at run time.  CONTRIBUTING.md lists the tests to extend.
 """
 
@@ -14,7 +14,7 @@ from importlib import import_module
 
 from mstmm.errors import SceneError
 
-from ..methods import IMPLICIT, METHODS_WITH_RADIUS, TANGENTS
+from ..methods import EXPLICIT, IMPLICIT, METHODS_WITH_RADIUS, TANGENTS
 from .implicit_methods import with_position_constraints
 from .tableau import Tableau, from_monomials, hermite, to_read_only
 
@@ -41,7 +41,6 @@ __all__ = [
     "to_read_only",
 ]
 
-EXPLICIT = ("rk4", "dopri5", "dop853", "pirk13")
 BUILT_IN = EXPLICIT + IMPLICIT
 
 #: Explicit methods, as messages list them.
@@ -136,8 +135,7 @@ def check_steps(tableau: Tableau, step: float | None) -> None:
     suggested_method = "genalpha" if tableau.implicit else "dopri5"
     raise SceneError(
         f'method "{tableau.name}" takes fixed steps: give step in s, or use {suggested_method}, '
-        f"which chooses "
-        "its steps by their error"
+        "which chooses its steps by their error"
     )
 
 

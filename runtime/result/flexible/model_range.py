@@ -328,8 +328,7 @@ def rows(ranges: Sequence[ModelRange]) -> list[tuple[str, str]]:
 def _body_rows(body_range: ModelRange) -> list[tuple[str, str]]:
     motion_parts = [
         f"slope {body_range.slope:.2g} (frame error up to {body_range.frame_error:.0e} of the "
-        "deflection, "
-        f"{body_range.shortening_error:.0e} of the foreshortening)"
+        f"deflection, {body_range.shortening_error:.0e} of the foreshortening)"
     ]
     if body_range.strain is not None:
         motion_parts.append(f"strain {body_range.strain:.1e}")

@@ -117,8 +117,7 @@ def _rotation_risk(body: ModelRange) -> Risk | None:
         "turn",
         f'"{body.name}"',
         f'a section of "{body.name}" rotates by {body.turn:.2g} rad relative to its floating '
-        "frame; "
-        "the model is not valid above 1.5 rad",
+        "frame; the model is not valid above 1.5 rad",
         "split the body into welded parts",
         body.turn,
         MAX_ROTATION,

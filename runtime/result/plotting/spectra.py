@@ -34,8 +34,7 @@ def spectrum(t: Array, quantity: Quantity) -> tuple[Array, Array]:
     if len(t) < _MIN_SAMPLES:
         raise SceneError(
             f'"{quantity.name}": a spectrum needs {_MIN_SAMPLES} samples or more, there are '
-            f"{len(t)}; "
-            "give more output times"
+            f"{len(t)}; give more output times"
         )
     if not np.isfinite(values).all():
         raise SceneError(f'"{quantity.name}": some values are not finite, so it has no spectrum')

@@ -76,8 +76,7 @@ class SceneView(NotebookDisplay):
         if ending not in VIEW_SUFFIXES:
             raise SceneError(
                 f'view "{path}": expected a name ending in {", ".join(VIEW_SUFFIXES)}, or a '
-                f"folder for "
-                "frames, without an ending"
+                "folder for frames, without an ending"
             )
         with replace_atomically(path) as temporary_path:
             self._write(temporary_path, ending, moments, self.stage.title if title else "")
