@@ -14,7 +14,8 @@ from mstmm.ir.differentiation import derivatives
 from mstmm.ir.graph import Graph, Node
 from mstmm.ir.inline import Inliner, Nodes, element_nodes
 
-from ..equations import riccati_sweep, tangent_hinge_elimination
+from ..equations import riccati_sweep
+from ..equations import tangent_hinge_elimination as hinge_tangent
 from ..lower.kernel_lowering import lower
 
 #: Outputs of the hinge kernel that have a directional derivative in the generic steps.
@@ -150,21 +151,19 @@ def _forward_kernel(nu: int) -> KernelIR:
 
 @cache
 def _carrier_kernel(nu: int) -> KernelIR:
-    return lower(tangent_hinge_elimination.tangent_carrier(nu), "tangent_carrier")
+    return lower(hinge_tangent.tangent_carrier(nu), "tangent_carrier")
 
 
 @cache
 def _column_kernel(nu: int) -> KernelIR:
-    return lower(tangent_hinge_elimination.tangent_column(nu), "tangent_column")
+    return lower(hinge_tangent.tangent_column(nu), "tangent_column")
 
 
 @cache
 def _along_kernel(nu: int) -> KernelIR:
-    return lower(
-        tangent_hinge_elimination.tangent_coordinate_change(nu), "tangent_coordinate_change"
-    )
+    return lower(hinge_tangent.tangent_coordinate_change(nu), "tangent_coordinate_change")
 
 
 @cache
 def _rotation_kernel() -> KernelIR:
-    return lower(tangent_hinge_elimination.tangent_pose_change(), "tangent_pose_change")
+    return lower(hinge_tangent.tangent_pose_change(), "tangent_pose_change")

@@ -77,11 +77,9 @@ POINTER_CALLEES = {
 MAX_SPEEDS = 6
 GENERIC_KERNELS = (
     "forward", "condense", "recover", "effort", "required_load", "project", "factor", "column_load",
-    "ground_column_load", "column_acceleration",
-    "qr_eliminate", "complement", "divide", "couple", "add_known_part", "add_multiplier_effort",
-    "forward_slope", "effort_slope", "complement_slope", "add_known_part_slope",
-    "add_multiplier_effort_slope",
-    "tangent_carrier", "tangent_column",
+    "ground_column_load", "column_acceleration", "qr_eliminate", "complement", "divide", "couple",
+    "add_known_part", "add_multiplier_effort", "forward_slope", "effort_slope", "complement_slope",
+    "add_known_part_slope", "add_multiplier_effort_slope", "tangent_carrier", "tangent_column",
     "tangent_coordinate_change", "tangent_steady", "tangent_rotational", "tangent_rows",
     "tangent_reduce", "tangent_load", "tangent_solution", "tangent_load_with_increments",
     "tangent_solution_with_increments",

@@ -28,9 +28,7 @@ Matrix = list[Nodes]
 #: speeds, with four times the compile time.
 _MAX_SPEEDS_STORED = 8
 #: Prescribed motion is not applied: coordinates are used as given.
-RATES = Sweep(
-    "rates", "Rates of the coordinates.", (Run(whole=PRESCRIBED_ACCELERATIONS), Run(whole=FORWARD))
-)
+RATES = Sweep("rates", "Rates of q.", (Run(whole=PRESCRIBED_ACCELERATIONS), Run(whole=FORWARD)))
 
 
 def fuse_implicit(structure: Structure, kernels: Kernels) -> FusedSceneIR:

@@ -56,9 +56,8 @@ def efforts_of_own(x: str, when: str) -> ForEach:
 
 def efforts_of(x: str, when: str, *more: Step) -> ForEach:
     """Efforts of the couplings of a tree hinge, from their multipliers."""
-    effort_call = call(
-        "generic{nu}.add_multiplier_effort", when="coupled", y="pending.tau", x=x, y_0="body.tau"
-    )
+    effort_call = call("generic{nu}.add_multiplier_effort", when="coupled", y="pending.tau", x=x,
+                       y_0="body.tau")  # fmt: skip
     return ForEach(of="pending", when=when, steps=(effort_call, *more))
 
 
