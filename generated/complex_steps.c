@@ -18,8 +18,8 @@
  * in  S_p[9][6] change of the load by the pose, one row per entry
  * out T_p[9][6] S_p Th_p, one row per entry
  * out T_w[3][6] S_p Th_z by angular velocity, added to what is there
- * out S_pI[9][6] that of the parent, added to what is there
- * out S_wI[3][6] the parent's S, of it that, added to what is there
+ * out S_pI[9][6] S_p of the parent, added to what is there
+ * out S_wI[3][6] S of the parent, by angular velocity, added to what is there
  */
 static int mstmm_complex_sweep_frames_placed_carry(const double *restrict Rc, const double *restrict r,
     const mstmm_complex *restrict S_p, mstmm_complex *restrict T_p, mstmm_complex *restrict T_w, mstmm_complex *restrict S_pI,
@@ -1081,7 +1081,7 @@ static int mstmm_complex_sweep_frames_placed_carry(const double *restrict Rc, co
  * in  p_I[9] change of the parent's pose, parent axes
  * out p[9] change of pose: rotation, position and velocity of P, own axes
  */
-static int mstmm_complex_sweep_frames_placed_moved(const double *restrict Rc, const double *restrict r,
+static int mstmm_complex_sweep_frames_placed_displacement(const double *restrict Rc, const double *restrict r,
     const mstmm_complex *restrict z_I, const mstmm_complex *restrict p_I, mstmm_complex *restrict p)
 {
     const mstmm_complex t0 = mstmm_complex_scaled(Rc[0], p_I[0]);
@@ -1175,7 +1175,7 @@ static int mstmm_complex_sweep_frames_placed_moved(const double *restrict Rc, co
  * in  w[3] (rad/s) relative angular velocity of the hinge, body axes
  * in  S[9][6] change of the load by that of the motion, one row per entry
  * out T[9][6] S Th, one row per entry
- * out S_I[9][6] that of the parent, added to what is there
+ * out S_I[9][6] S of the parent, added to what is there
  */
 static int mstmm_complex_sweep_frames_tangent_carry(const double *restrict Rc, const double *restrict r,
     const double *restrict w_I, const double *restrict v, const double *restrict w,
@@ -2240,7 +2240,7 @@ static int mstmm_complex_sweep_frames_tangent_carry(const double *restrict Rc, c
     return 0;
 }
 
-/* change of a body's motion by that of its parent's
+/* change of a body's motion by that of its parent
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -2251,7 +2251,7 @@ static int mstmm_complex_sweep_frames_tangent_carry(const double *restrict Rc, c
  * in  z_I[9] change of the parent's motion, parent axes
  * out z[9] change of the body's motion, own axes
  */
-static int mstmm_complex_sweep_frames_tangent_moved(const double *restrict Rc, const double *restrict r,
+static int mstmm_complex_sweep_frames_tangent_motion(const double *restrict Rc, const double *restrict r,
     const double *restrict w_I, const double *restrict v, const double *restrict w,
     const mstmm_complex *restrict z_I, mstmm_complex *restrict z)
 {
@@ -2453,1731 +2453,6 @@ static int mstmm_complex_sweep_frames_transport(const double *restrict Rc, const
     return 0;
 }
 
-/* solution of a hinge with 1 free speed for a right-hand side
- * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
- * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  Rc[3][3] rotation, body axes to parent axes
- * in  r[3] (m) P of the body from P of the parent, parent axes
- * in  w_I[3] (rad/s) angular velocity of the parent, parent axes
- * in  v[3] (m/s) relative velocity of the hinge, body axes
- * in  w[3] (rad/s) relative angular velocity of the hinge, body axes
- * in  z_I[9] change of the parent's motion, parent axes
- * in  B[1][9] motion along the unknowns
- * in  gain[1][9] D^-1 times the rows by the motion
- * in  y[1] D^-1 times the remainder of the rows
- * out x[1] unknowns
- * out z[9] change of the body's motion, own axes
- */
-static int mstmm_complex_sweep_generic1_tangent_answer(const double *restrict Rc, const double *restrict r,
-    const double *restrict w_I, const double *restrict v, const double *restrict w,
-    const mstmm_complex *restrict z_I, const mstmm_complex *restrict B, const mstmm_complex *restrict gain,
-    const mstmm_complex *restrict y, mstmm_complex *restrict x, mstmm_complex *restrict z)
-{
-    const mstmm_complex t0 = mstmm_complex_scaled(Rc[0], z_I[0]);
-    const mstmm_complex t1 = mstmm_complex_scaled(Rc[3], z_I[1]);
-    const mstmm_complex t2 = mstmm_complex_plus(t0, t1);
-    const mstmm_complex t3 = mstmm_complex_scaled(Rc[6], z_I[2]);
-    const mstmm_complex t4 = mstmm_complex_plus(t2, t3);
-    const mstmm_complex t5 = mstmm_complex_times(gain[0], t4);
-    const mstmm_complex t6 = mstmm_complex_scaled(Rc[1], z_I[0]);
-    const mstmm_complex t7 = mstmm_complex_scaled(Rc[4], z_I[1]);
-    const mstmm_complex t8 = mstmm_complex_plus(t6, t7);
-    const mstmm_complex t9 = mstmm_complex_scaled(Rc[7], z_I[2]);
-    const mstmm_complex t10 = mstmm_complex_plus(t8, t9);
-    const mstmm_complex t11 = mstmm_complex_times(gain[1], t10);
-    const mstmm_complex t12 = mstmm_complex_plus(t5, t11);
-    const mstmm_complex t13 = mstmm_complex_scaled(Rc[2], z_I[0]);
-    const mstmm_complex t14 = mstmm_complex_scaled(Rc[5], z_I[1]);
-    const mstmm_complex t15 = mstmm_complex_plus(t13, t14);
-    const mstmm_complex t16 = mstmm_complex_scaled(Rc[8], z_I[2]);
-    const mstmm_complex t17 = mstmm_complex_plus(t15, t16);
-    const mstmm_complex t18 = mstmm_complex_times(gain[2], t17);
-    const mstmm_complex t19 = mstmm_complex_plus(t12, t18);
-    const mstmm_complex t20 = mstmm_complex_scaled(w[2], t10);
-    const mstmm_complex t21 = mstmm_complex_scaled(w[1], t17);
-    const mstmm_complex t22 = mstmm_complex_minus(t20, t21);
-    const mstmm_complex t23 = mstmm_complex_scaled(Rc[0], z_I[3]);
-    const mstmm_complex t24 = mstmm_complex_scaled(Rc[3], z_I[4]);
-    const mstmm_complex t25 = mstmm_complex_plus(t23, t24);
-    const mstmm_complex t26 = mstmm_complex_scaled(Rc[6], z_I[5]);
-    const mstmm_complex t27 = mstmm_complex_plus(t25, t26);
-    const mstmm_complex t28 = mstmm_complex_plus(t22, t27);
-    const mstmm_complex t29 = mstmm_complex_times(gain[3], t28);
-    const mstmm_complex t30 = mstmm_complex_plus(t19, t29);
-    const mstmm_complex t31 = mstmm_complex_scaled(w[0], t17);
-    const mstmm_complex t32 = mstmm_complex_scaled(w[2], t4);
-    const mstmm_complex t33 = mstmm_complex_minus(t31, t32);
-    const mstmm_complex t34 = mstmm_complex_scaled(Rc[1], z_I[3]);
-    const mstmm_complex t35 = mstmm_complex_scaled(Rc[4], z_I[4]);
-    const mstmm_complex t36 = mstmm_complex_plus(t34, t35);
-    const mstmm_complex t37 = mstmm_complex_scaled(Rc[7], z_I[5]);
-    const mstmm_complex t38 = mstmm_complex_plus(t36, t37);
-    const mstmm_complex t39 = mstmm_complex_plus(t33, t38);
-    const mstmm_complex t40 = mstmm_complex_times(gain[4], t39);
-    const mstmm_complex t41 = mstmm_complex_plus(t30, t40);
-    const mstmm_complex t42 = mstmm_complex_scaled(w[1], t4);
-    const mstmm_complex t43 = mstmm_complex_scaled(w[0], t10);
-    const mstmm_complex t44 = mstmm_complex_minus(t42, t43);
-    const mstmm_complex t45 = mstmm_complex_scaled(Rc[2], z_I[3]);
-    const mstmm_complex t46 = mstmm_complex_scaled(Rc[5], z_I[4]);
-    const mstmm_complex t47 = mstmm_complex_plus(t45, t46);
-    const mstmm_complex t48 = mstmm_complex_scaled(Rc[8], z_I[5]);
-    const mstmm_complex t49 = mstmm_complex_plus(t47, t48);
-    const mstmm_complex t50 = mstmm_complex_plus(t44, t49);
-    const mstmm_complex t51 = mstmm_complex_times(gain[5], t50);
-    const mstmm_complex t52 = mstmm_complex_plus(t41, t51);
-    const double t53 = v[2] * 2.0;
-    const mstmm_complex t54 = mstmm_complex_scaled(t53, t10);
-    const double t55 = v[1] * 2.0;
-    const mstmm_complex t56 = mstmm_complex_scaled(t55, t17);
-    const mstmm_complex t57 = mstmm_complex_minus(t54, t56);
-    const mstmm_complex t58 = mstmm_complex_scaled(r[2], z_I[4]);
-    const double t59 = r[1] * w_I[1];
-    const double t60 = r[2] * w_I[2];
-    const double t61 = t59 + t60;
-    const mstmm_complex t62 = mstmm_complex_scaled(t61, z_I[0]);
-    const double t63 = r[0] * w_I[1];
-    const double t64 = 2.0 * t63;
-    const double t65 = r[1] * w_I[0];
-    const double t66 = t64 - t65;
-    const mstmm_complex t67 = mstmm_complex_scaled(t66, z_I[1]);
-    const double t68 = r[0] * w_I[2];
-    const double t69 = 2.0 * t68;
-    const double t70 = r[2] * w_I[0];
-    const double t71 = t69 - t70;
-    const mstmm_complex t72 = mstmm_complex_scaled(t71, z_I[2]);
-    const mstmm_complex t73 = mstmm_complex_plus(t67, t72);
-    const mstmm_complex t74 = mstmm_complex_minus(t62, t73);
-    const mstmm_complex t75 = mstmm_complex_scaled(r[1], z_I[5]);
-    const mstmm_complex t76 = mstmm_complex_minus(t74, t75);
-    const mstmm_complex t77 = mstmm_complex_plus(t58, t76);
-    const mstmm_complex t78 = mstmm_complex_plus(z_I[6], t77);
-    const mstmm_complex t79 = mstmm_complex_scaled(Rc[0], t78);
-    const mstmm_complex t80 = mstmm_complex_scaled(r[0], z_I[5]);
-    const double t81 = r[0] * w_I[0];
-    const double t82 = t60 + t81;
-    const mstmm_complex t83 = mstmm_complex_scaled(t82, z_I[1]);
-    const double t84 = 2.0 * t65;
-    const double t85 = t84 - t63;
-    const mstmm_complex t86 = mstmm_complex_scaled(t85, z_I[0]);
-    const mstmm_complex t87 = mstmm_complex_minus(t83, t86);
-    const double t88 = r[1] * w_I[2];
-    const double t89 = 2.0 * t88;
-    const double t90 = r[2] * w_I[1];
-    const double t91 = t89 - t90;
-    const mstmm_complex t92 = mstmm_complex_scaled(t91, z_I[2]);
-    const mstmm_complex t93 = mstmm_complex_minus(t87, t92);
-    const mstmm_complex t94 = mstmm_complex_plus(t80, t93);
-    const mstmm_complex t95 = mstmm_complex_scaled(r[2], z_I[3]);
-    const mstmm_complex t96 = mstmm_complex_minus(t94, t95);
-    const mstmm_complex t97 = mstmm_complex_plus(z_I[7], t96);
-    const mstmm_complex t98 = mstmm_complex_scaled(Rc[3], t97);
-    const mstmm_complex t99 = mstmm_complex_plus(t79, t98);
-    const mstmm_complex t100 = mstmm_complex_scaled(r[1], z_I[3]);
-    const double t101 = t59 + t81;
-    const mstmm_complex t102 = mstmm_complex_scaled(t101, z_I[2]);
-    const double t103 = 2.0 * t70;
-    const double t104 = t103 - t68;
-    const mstmm_complex t105 = mstmm_complex_scaled(t104, z_I[0]);
-    const mstmm_complex t106 = mstmm_complex_minus(t102, t105);
-    const double t107 = 2.0 * t90;
-    const double t108 = t107 - t88;
-    const mstmm_complex t109 = mstmm_complex_scaled(t108, z_I[1]);
-    const mstmm_complex t110 = mstmm_complex_minus(t106, t109);
-    const mstmm_complex t111 = mstmm_complex_scaled(r[0], z_I[4]);
-    const mstmm_complex t112 = mstmm_complex_minus(t110, t111);
-    const mstmm_complex t113 = mstmm_complex_plus(t100, t112);
-    const mstmm_complex t114 = mstmm_complex_plus(z_I[8], t113);
-    const mstmm_complex t115 = mstmm_complex_scaled(Rc[6], t114);
-    const mstmm_complex t116 = mstmm_complex_plus(t99, t115);
-    const mstmm_complex t117 = mstmm_complex_plus(t57, t116);
-    const mstmm_complex t118 = mstmm_complex_times(gain[6], t117);
-    const mstmm_complex t119 = mstmm_complex_plus(t52, t118);
-    const double t120 = v[0] * 2.0;
-    const mstmm_complex t121 = mstmm_complex_scaled(t120, t17);
-    const mstmm_complex t122 = mstmm_complex_scaled(t53, t4);
-    const mstmm_complex t123 = mstmm_complex_minus(t121, t122);
-    const mstmm_complex t124 = mstmm_complex_scaled(Rc[1], t78);
-    const mstmm_complex t125 = mstmm_complex_scaled(Rc[4], t97);
-    const mstmm_complex t126 = mstmm_complex_plus(t124, t125);
-    const mstmm_complex t127 = mstmm_complex_scaled(Rc[7], t114);
-    const mstmm_complex t128 = mstmm_complex_plus(t126, t127);
-    const mstmm_complex t129 = mstmm_complex_plus(t123, t128);
-    const mstmm_complex t130 = mstmm_complex_times(gain[7], t129);
-    const mstmm_complex t131 = mstmm_complex_plus(t119, t130);
-    const mstmm_complex t132 = mstmm_complex_scaled(t55, t4);
-    const mstmm_complex t133 = mstmm_complex_scaled(t120, t10);
-    const mstmm_complex t134 = mstmm_complex_minus(t132, t133);
-    const mstmm_complex t135 = mstmm_complex_scaled(Rc[2], t78);
-    const mstmm_complex t136 = mstmm_complex_scaled(Rc[5], t97);
-    const mstmm_complex t137 = mstmm_complex_plus(t135, t136);
-    const mstmm_complex t138 = mstmm_complex_scaled(Rc[8], t114);
-    const mstmm_complex t139 = mstmm_complex_plus(t137, t138);
-    const mstmm_complex t140 = mstmm_complex_plus(t134, t139);
-    const mstmm_complex t141 = mstmm_complex_times(gain[8], t140);
-    const mstmm_complex t142 = mstmm_complex_plus(t131, t141);
-    const mstmm_complex t143 = mstmm_complex_minus(y[0], t142);
-    x[0] = t143;
-    const mstmm_complex t144 = mstmm_complex_times(B[0], t143);
-    const mstmm_complex t145 = mstmm_complex_plus(t4, t144);
-    z[0] = t145;
-    const mstmm_complex t146 = mstmm_complex_times(B[1], t143);
-    const mstmm_complex t147 = mstmm_complex_plus(t10, t146);
-    z[1] = t147;
-    const mstmm_complex t148 = mstmm_complex_times(B[2], t143);
-    const mstmm_complex t149 = mstmm_complex_plus(t17, t148);
-    z[2] = t149;
-    const mstmm_complex t150 = mstmm_complex_times(B[3], t143);
-    const mstmm_complex t151 = mstmm_complex_plus(t28, t150);
-    z[3] = t151;
-    const mstmm_complex t152 = mstmm_complex_times(B[4], t143);
-    const mstmm_complex t153 = mstmm_complex_plus(t39, t152);
-    z[4] = t153;
-    const mstmm_complex t154 = mstmm_complex_times(B[5], t143);
-    const mstmm_complex t155 = mstmm_complex_plus(t50, t154);
-    z[5] = t155;
-    const mstmm_complex t156 = mstmm_complex_times(B[6], t143);
-    const mstmm_complex t157 = mstmm_complex_plus(t117, t156);
-    z[6] = t157;
-    const mstmm_complex t158 = mstmm_complex_times(B[7], t143);
-    const mstmm_complex t159 = mstmm_complex_plus(t129, t158);
-    z[7] = t159;
-    const mstmm_complex t160 = mstmm_complex_times(B[8], t143);
-    const mstmm_complex t161 = mstmm_complex_plus(t140, t160);
-    z[8] = t161;
-    return 0;
-}
-
-/* solution of a hinge with 2 free speeds for a right-hand side
- * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
- * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  Rc[3][3] rotation, body axes to parent axes
- * in  r[3] (m) P of the body from P of the parent, parent axes
- * in  w_I[3] (rad/s) angular velocity of the parent, parent axes
- * in  v[3] (m/s) relative velocity of the hinge, body axes
- * in  w[3] (rad/s) relative angular velocity of the hinge, body axes
- * in  z_I[9] change of the parent's motion, parent axes
- * in  B[2][9] motion along the unknowns
- * in  gain[2][9] D^-1 times the rows by the motion
- * in  y[2] D^-1 times the remainder of the rows
- * out x[2] unknowns
- * out z[9] change of the body's motion, own axes
- */
-static int mstmm_complex_sweep_generic2_tangent_answer(const double *restrict Rc, const double *restrict r,
-    const double *restrict w_I, const double *restrict v, const double *restrict w,
-    const mstmm_complex *restrict z_I, const mstmm_complex *restrict B, const mstmm_complex *restrict gain,
-    const mstmm_complex *restrict y, mstmm_complex *restrict x, mstmm_complex *restrict z)
-{
-    const mstmm_complex t0 = mstmm_complex_scaled(Rc[0], z_I[0]);
-    const mstmm_complex t1 = mstmm_complex_scaled(Rc[3], z_I[1]);
-    const mstmm_complex t2 = mstmm_complex_plus(t0, t1);
-    const mstmm_complex t3 = mstmm_complex_scaled(Rc[6], z_I[2]);
-    const mstmm_complex t4 = mstmm_complex_plus(t2, t3);
-    const mstmm_complex t5 = mstmm_complex_times(gain[0], t4);
-    const mstmm_complex t6 = mstmm_complex_scaled(Rc[1], z_I[0]);
-    const mstmm_complex t7 = mstmm_complex_scaled(Rc[4], z_I[1]);
-    const mstmm_complex t8 = mstmm_complex_plus(t6, t7);
-    const mstmm_complex t9 = mstmm_complex_scaled(Rc[7], z_I[2]);
-    const mstmm_complex t10 = mstmm_complex_plus(t8, t9);
-    const mstmm_complex t11 = mstmm_complex_times(gain[1], t10);
-    const mstmm_complex t12 = mstmm_complex_plus(t5, t11);
-    const mstmm_complex t13 = mstmm_complex_scaled(Rc[2], z_I[0]);
-    const mstmm_complex t14 = mstmm_complex_scaled(Rc[5], z_I[1]);
-    const mstmm_complex t15 = mstmm_complex_plus(t13, t14);
-    const mstmm_complex t16 = mstmm_complex_scaled(Rc[8], z_I[2]);
-    const mstmm_complex t17 = mstmm_complex_plus(t15, t16);
-    const mstmm_complex t18 = mstmm_complex_times(gain[2], t17);
-    const mstmm_complex t19 = mstmm_complex_plus(t12, t18);
-    const mstmm_complex t20 = mstmm_complex_scaled(w[2], t10);
-    const mstmm_complex t21 = mstmm_complex_scaled(w[1], t17);
-    const mstmm_complex t22 = mstmm_complex_minus(t20, t21);
-    const mstmm_complex t23 = mstmm_complex_scaled(Rc[0], z_I[3]);
-    const mstmm_complex t24 = mstmm_complex_scaled(Rc[3], z_I[4]);
-    const mstmm_complex t25 = mstmm_complex_plus(t23, t24);
-    const mstmm_complex t26 = mstmm_complex_scaled(Rc[6], z_I[5]);
-    const mstmm_complex t27 = mstmm_complex_plus(t25, t26);
-    const mstmm_complex t28 = mstmm_complex_plus(t22, t27);
-    const mstmm_complex t29 = mstmm_complex_times(gain[3], t28);
-    const mstmm_complex t30 = mstmm_complex_plus(t19, t29);
-    const mstmm_complex t31 = mstmm_complex_scaled(w[0], t17);
-    const mstmm_complex t32 = mstmm_complex_scaled(w[2], t4);
-    const mstmm_complex t33 = mstmm_complex_minus(t31, t32);
-    const mstmm_complex t34 = mstmm_complex_scaled(Rc[1], z_I[3]);
-    const mstmm_complex t35 = mstmm_complex_scaled(Rc[4], z_I[4]);
-    const mstmm_complex t36 = mstmm_complex_plus(t34, t35);
-    const mstmm_complex t37 = mstmm_complex_scaled(Rc[7], z_I[5]);
-    const mstmm_complex t38 = mstmm_complex_plus(t36, t37);
-    const mstmm_complex t39 = mstmm_complex_plus(t33, t38);
-    const mstmm_complex t40 = mstmm_complex_times(gain[4], t39);
-    const mstmm_complex t41 = mstmm_complex_plus(t30, t40);
-    const mstmm_complex t42 = mstmm_complex_scaled(w[1], t4);
-    const mstmm_complex t43 = mstmm_complex_scaled(w[0], t10);
-    const mstmm_complex t44 = mstmm_complex_minus(t42, t43);
-    const mstmm_complex t45 = mstmm_complex_scaled(Rc[2], z_I[3]);
-    const mstmm_complex t46 = mstmm_complex_scaled(Rc[5], z_I[4]);
-    const mstmm_complex t47 = mstmm_complex_plus(t45, t46);
-    const mstmm_complex t48 = mstmm_complex_scaled(Rc[8], z_I[5]);
-    const mstmm_complex t49 = mstmm_complex_plus(t47, t48);
-    const mstmm_complex t50 = mstmm_complex_plus(t44, t49);
-    const mstmm_complex t51 = mstmm_complex_times(gain[5], t50);
-    const mstmm_complex t52 = mstmm_complex_plus(t41, t51);
-    const double t53 = v[2] * 2.0;
-    const mstmm_complex t54 = mstmm_complex_scaled(t53, t10);
-    const double t55 = v[1] * 2.0;
-    const mstmm_complex t56 = mstmm_complex_scaled(t55, t17);
-    const mstmm_complex t57 = mstmm_complex_minus(t54, t56);
-    const mstmm_complex t58 = mstmm_complex_scaled(r[2], z_I[4]);
-    const double t59 = r[1] * w_I[1];
-    const double t60 = r[2] * w_I[2];
-    const double t61 = t59 + t60;
-    const mstmm_complex t62 = mstmm_complex_scaled(t61, z_I[0]);
-    const double t63 = r[0] * w_I[1];
-    const double t64 = 2.0 * t63;
-    const double t65 = r[1] * w_I[0];
-    const double t66 = t64 - t65;
-    const mstmm_complex t67 = mstmm_complex_scaled(t66, z_I[1]);
-    const double t68 = r[0] * w_I[2];
-    const double t69 = 2.0 * t68;
-    const double t70 = r[2] * w_I[0];
-    const double t71 = t69 - t70;
-    const mstmm_complex t72 = mstmm_complex_scaled(t71, z_I[2]);
-    const mstmm_complex t73 = mstmm_complex_plus(t67, t72);
-    const mstmm_complex t74 = mstmm_complex_minus(t62, t73);
-    const mstmm_complex t75 = mstmm_complex_scaled(r[1], z_I[5]);
-    const mstmm_complex t76 = mstmm_complex_minus(t74, t75);
-    const mstmm_complex t77 = mstmm_complex_plus(t58, t76);
-    const mstmm_complex t78 = mstmm_complex_plus(z_I[6], t77);
-    const mstmm_complex t79 = mstmm_complex_scaled(Rc[0], t78);
-    const mstmm_complex t80 = mstmm_complex_scaled(r[0], z_I[5]);
-    const double t81 = r[0] * w_I[0];
-    const double t82 = t60 + t81;
-    const mstmm_complex t83 = mstmm_complex_scaled(t82, z_I[1]);
-    const double t84 = 2.0 * t65;
-    const double t85 = t84 - t63;
-    const mstmm_complex t86 = mstmm_complex_scaled(t85, z_I[0]);
-    const mstmm_complex t87 = mstmm_complex_minus(t83, t86);
-    const double t88 = r[1] * w_I[2];
-    const double t89 = 2.0 * t88;
-    const double t90 = r[2] * w_I[1];
-    const double t91 = t89 - t90;
-    const mstmm_complex t92 = mstmm_complex_scaled(t91, z_I[2]);
-    const mstmm_complex t93 = mstmm_complex_minus(t87, t92);
-    const mstmm_complex t94 = mstmm_complex_plus(t80, t93);
-    const mstmm_complex t95 = mstmm_complex_scaled(r[2], z_I[3]);
-    const mstmm_complex t96 = mstmm_complex_minus(t94, t95);
-    const mstmm_complex t97 = mstmm_complex_plus(z_I[7], t96);
-    const mstmm_complex t98 = mstmm_complex_scaled(Rc[3], t97);
-    const mstmm_complex t99 = mstmm_complex_plus(t79, t98);
-    const mstmm_complex t100 = mstmm_complex_scaled(r[1], z_I[3]);
-    const double t101 = t59 + t81;
-    const mstmm_complex t102 = mstmm_complex_scaled(t101, z_I[2]);
-    const double t103 = 2.0 * t70;
-    const double t104 = t103 - t68;
-    const mstmm_complex t105 = mstmm_complex_scaled(t104, z_I[0]);
-    const mstmm_complex t106 = mstmm_complex_minus(t102, t105);
-    const double t107 = 2.0 * t90;
-    const double t108 = t107 - t88;
-    const mstmm_complex t109 = mstmm_complex_scaled(t108, z_I[1]);
-    const mstmm_complex t110 = mstmm_complex_minus(t106, t109);
-    const mstmm_complex t111 = mstmm_complex_scaled(r[0], z_I[4]);
-    const mstmm_complex t112 = mstmm_complex_minus(t110, t111);
-    const mstmm_complex t113 = mstmm_complex_plus(t100, t112);
-    const mstmm_complex t114 = mstmm_complex_plus(z_I[8], t113);
-    const mstmm_complex t115 = mstmm_complex_scaled(Rc[6], t114);
-    const mstmm_complex t116 = mstmm_complex_plus(t99, t115);
-    const mstmm_complex t117 = mstmm_complex_plus(t57, t116);
-    const mstmm_complex t118 = mstmm_complex_times(gain[6], t117);
-    const mstmm_complex t119 = mstmm_complex_plus(t52, t118);
-    const double t120 = v[0] * 2.0;
-    const mstmm_complex t121 = mstmm_complex_scaled(t120, t17);
-    const mstmm_complex t122 = mstmm_complex_scaled(t53, t4);
-    const mstmm_complex t123 = mstmm_complex_minus(t121, t122);
-    const mstmm_complex t124 = mstmm_complex_scaled(Rc[1], t78);
-    const mstmm_complex t125 = mstmm_complex_scaled(Rc[4], t97);
-    const mstmm_complex t126 = mstmm_complex_plus(t124, t125);
-    const mstmm_complex t127 = mstmm_complex_scaled(Rc[7], t114);
-    const mstmm_complex t128 = mstmm_complex_plus(t126, t127);
-    const mstmm_complex t129 = mstmm_complex_plus(t123, t128);
-    const mstmm_complex t130 = mstmm_complex_times(gain[7], t129);
-    const mstmm_complex t131 = mstmm_complex_plus(t119, t130);
-    const mstmm_complex t132 = mstmm_complex_scaled(t55, t4);
-    const mstmm_complex t133 = mstmm_complex_scaled(t120, t10);
-    const mstmm_complex t134 = mstmm_complex_minus(t132, t133);
-    const mstmm_complex t135 = mstmm_complex_scaled(Rc[2], t78);
-    const mstmm_complex t136 = mstmm_complex_scaled(Rc[5], t97);
-    const mstmm_complex t137 = mstmm_complex_plus(t135, t136);
-    const mstmm_complex t138 = mstmm_complex_scaled(Rc[8], t114);
-    const mstmm_complex t139 = mstmm_complex_plus(t137, t138);
-    const mstmm_complex t140 = mstmm_complex_plus(t134, t139);
-    const mstmm_complex t141 = mstmm_complex_times(gain[8], t140);
-    const mstmm_complex t142 = mstmm_complex_plus(t131, t141);
-    const mstmm_complex t143 = mstmm_complex_minus(y[0], t142);
-    x[0] = t143;
-    const mstmm_complex t144 = mstmm_complex_times(gain[9], t4);
-    const mstmm_complex t145 = mstmm_complex_times(gain[10], t10);
-    const mstmm_complex t146 = mstmm_complex_plus(t144, t145);
-    const mstmm_complex t147 = mstmm_complex_times(gain[11], t17);
-    const mstmm_complex t148 = mstmm_complex_plus(t146, t147);
-    const mstmm_complex t149 = mstmm_complex_times(gain[12], t28);
-    const mstmm_complex t150 = mstmm_complex_plus(t148, t149);
-    const mstmm_complex t151 = mstmm_complex_times(gain[13], t39);
-    const mstmm_complex t152 = mstmm_complex_plus(t150, t151);
-    const mstmm_complex t153 = mstmm_complex_times(gain[14], t50);
-    const mstmm_complex t154 = mstmm_complex_plus(t152, t153);
-    const mstmm_complex t155 = mstmm_complex_times(gain[15], t117);
-    const mstmm_complex t156 = mstmm_complex_plus(t154, t155);
-    const mstmm_complex t157 = mstmm_complex_times(gain[16], t129);
-    const mstmm_complex t158 = mstmm_complex_plus(t156, t157);
-    const mstmm_complex t159 = mstmm_complex_times(gain[17], t140);
-    const mstmm_complex t160 = mstmm_complex_plus(t158, t159);
-    const mstmm_complex t161 = mstmm_complex_minus(y[1], t160);
-    x[1] = t161;
-    const mstmm_complex t162 = mstmm_complex_times(B[0], t143);
-    const mstmm_complex t163 = mstmm_complex_times(B[9], t161);
-    const mstmm_complex t164 = mstmm_complex_plus(t162, t163);
-    const mstmm_complex t165 = mstmm_complex_plus(t4, t164);
-    z[0] = t165;
-    const mstmm_complex t166 = mstmm_complex_times(B[1], t143);
-    const mstmm_complex t167 = mstmm_complex_times(B[10], t161);
-    const mstmm_complex t168 = mstmm_complex_plus(t166, t167);
-    const mstmm_complex t169 = mstmm_complex_plus(t10, t168);
-    z[1] = t169;
-    const mstmm_complex t170 = mstmm_complex_times(B[2], t143);
-    const mstmm_complex t171 = mstmm_complex_times(B[11], t161);
-    const mstmm_complex t172 = mstmm_complex_plus(t170, t171);
-    const mstmm_complex t173 = mstmm_complex_plus(t17, t172);
-    z[2] = t173;
-    const mstmm_complex t174 = mstmm_complex_times(B[3], t143);
-    const mstmm_complex t175 = mstmm_complex_times(B[12], t161);
-    const mstmm_complex t176 = mstmm_complex_plus(t174, t175);
-    const mstmm_complex t177 = mstmm_complex_plus(t28, t176);
-    z[3] = t177;
-    const mstmm_complex t178 = mstmm_complex_times(B[4], t143);
-    const mstmm_complex t179 = mstmm_complex_times(B[13], t161);
-    const mstmm_complex t180 = mstmm_complex_plus(t178, t179);
-    const mstmm_complex t181 = mstmm_complex_plus(t39, t180);
-    z[4] = t181;
-    const mstmm_complex t182 = mstmm_complex_times(B[5], t143);
-    const mstmm_complex t183 = mstmm_complex_times(B[14], t161);
-    const mstmm_complex t184 = mstmm_complex_plus(t182, t183);
-    const mstmm_complex t185 = mstmm_complex_plus(t50, t184);
-    z[5] = t185;
-    const mstmm_complex t186 = mstmm_complex_times(B[6], t143);
-    const mstmm_complex t187 = mstmm_complex_times(B[15], t161);
-    const mstmm_complex t188 = mstmm_complex_plus(t186, t187);
-    const mstmm_complex t189 = mstmm_complex_plus(t117, t188);
-    z[6] = t189;
-    const mstmm_complex t190 = mstmm_complex_times(B[7], t143);
-    const mstmm_complex t191 = mstmm_complex_times(B[16], t161);
-    const mstmm_complex t192 = mstmm_complex_plus(t190, t191);
-    const mstmm_complex t193 = mstmm_complex_plus(t129, t192);
-    z[7] = t193;
-    const mstmm_complex t194 = mstmm_complex_times(B[8], t143);
-    const mstmm_complex t195 = mstmm_complex_times(B[17], t161);
-    const mstmm_complex t196 = mstmm_complex_plus(t194, t195);
-    const mstmm_complex t197 = mstmm_complex_plus(t140, t196);
-    z[8] = t197;
-    return 0;
-}
-
-/* solution of a hinge with 3 free speeds for a right-hand side
- * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
- * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  Rc[3][3] rotation, body axes to parent axes
- * in  r[3] (m) P of the body from P of the parent, parent axes
- * in  w_I[3] (rad/s) angular velocity of the parent, parent axes
- * in  v[3] (m/s) relative velocity of the hinge, body axes
- * in  w[3] (rad/s) relative angular velocity of the hinge, body axes
- * in  z_I[9] change of the parent's motion, parent axes
- * in  B[3][9] motion along the unknowns
- * in  gain[3][9] D^-1 times the rows by the motion
- * in  y[3] D^-1 times the remainder of the rows
- * out x[3] unknowns
- * out z[9] change of the body's motion, own axes
- */
-static int mstmm_complex_sweep_generic3_tangent_answer(const double *restrict Rc, const double *restrict r,
-    const double *restrict w_I, const double *restrict v, const double *restrict w,
-    const mstmm_complex *restrict z_I, const mstmm_complex *restrict B, const mstmm_complex *restrict gain,
-    const mstmm_complex *restrict y, mstmm_complex *restrict x, mstmm_complex *restrict z)
-{
-    const mstmm_complex t0 = mstmm_complex_scaled(Rc[0], z_I[0]);
-    const mstmm_complex t1 = mstmm_complex_scaled(Rc[3], z_I[1]);
-    const mstmm_complex t2 = mstmm_complex_plus(t0, t1);
-    const mstmm_complex t3 = mstmm_complex_scaled(Rc[6], z_I[2]);
-    const mstmm_complex t4 = mstmm_complex_plus(t2, t3);
-    const mstmm_complex t5 = mstmm_complex_times(gain[0], t4);
-    const mstmm_complex t6 = mstmm_complex_scaled(Rc[1], z_I[0]);
-    const mstmm_complex t7 = mstmm_complex_scaled(Rc[4], z_I[1]);
-    const mstmm_complex t8 = mstmm_complex_plus(t6, t7);
-    const mstmm_complex t9 = mstmm_complex_scaled(Rc[7], z_I[2]);
-    const mstmm_complex t10 = mstmm_complex_plus(t8, t9);
-    const mstmm_complex t11 = mstmm_complex_times(gain[1], t10);
-    const mstmm_complex t12 = mstmm_complex_plus(t5, t11);
-    const mstmm_complex t13 = mstmm_complex_scaled(Rc[2], z_I[0]);
-    const mstmm_complex t14 = mstmm_complex_scaled(Rc[5], z_I[1]);
-    const mstmm_complex t15 = mstmm_complex_plus(t13, t14);
-    const mstmm_complex t16 = mstmm_complex_scaled(Rc[8], z_I[2]);
-    const mstmm_complex t17 = mstmm_complex_plus(t15, t16);
-    const mstmm_complex t18 = mstmm_complex_times(gain[2], t17);
-    const mstmm_complex t19 = mstmm_complex_plus(t12, t18);
-    const mstmm_complex t20 = mstmm_complex_scaled(w[2], t10);
-    const mstmm_complex t21 = mstmm_complex_scaled(w[1], t17);
-    const mstmm_complex t22 = mstmm_complex_minus(t20, t21);
-    const mstmm_complex t23 = mstmm_complex_scaled(Rc[0], z_I[3]);
-    const mstmm_complex t24 = mstmm_complex_scaled(Rc[3], z_I[4]);
-    const mstmm_complex t25 = mstmm_complex_plus(t23, t24);
-    const mstmm_complex t26 = mstmm_complex_scaled(Rc[6], z_I[5]);
-    const mstmm_complex t27 = mstmm_complex_plus(t25, t26);
-    const mstmm_complex t28 = mstmm_complex_plus(t22, t27);
-    const mstmm_complex t29 = mstmm_complex_times(gain[3], t28);
-    const mstmm_complex t30 = mstmm_complex_plus(t19, t29);
-    const mstmm_complex t31 = mstmm_complex_scaled(w[0], t17);
-    const mstmm_complex t32 = mstmm_complex_scaled(w[2], t4);
-    const mstmm_complex t33 = mstmm_complex_minus(t31, t32);
-    const mstmm_complex t34 = mstmm_complex_scaled(Rc[1], z_I[3]);
-    const mstmm_complex t35 = mstmm_complex_scaled(Rc[4], z_I[4]);
-    const mstmm_complex t36 = mstmm_complex_plus(t34, t35);
-    const mstmm_complex t37 = mstmm_complex_scaled(Rc[7], z_I[5]);
-    const mstmm_complex t38 = mstmm_complex_plus(t36, t37);
-    const mstmm_complex t39 = mstmm_complex_plus(t33, t38);
-    const mstmm_complex t40 = mstmm_complex_times(gain[4], t39);
-    const mstmm_complex t41 = mstmm_complex_plus(t30, t40);
-    const mstmm_complex t42 = mstmm_complex_scaled(w[1], t4);
-    const mstmm_complex t43 = mstmm_complex_scaled(w[0], t10);
-    const mstmm_complex t44 = mstmm_complex_minus(t42, t43);
-    const mstmm_complex t45 = mstmm_complex_scaled(Rc[2], z_I[3]);
-    const mstmm_complex t46 = mstmm_complex_scaled(Rc[5], z_I[4]);
-    const mstmm_complex t47 = mstmm_complex_plus(t45, t46);
-    const mstmm_complex t48 = mstmm_complex_scaled(Rc[8], z_I[5]);
-    const mstmm_complex t49 = mstmm_complex_plus(t47, t48);
-    const mstmm_complex t50 = mstmm_complex_plus(t44, t49);
-    const mstmm_complex t51 = mstmm_complex_times(gain[5], t50);
-    const mstmm_complex t52 = mstmm_complex_plus(t41, t51);
-    const double t53 = v[2] * 2.0;
-    const mstmm_complex t54 = mstmm_complex_scaled(t53, t10);
-    const double t55 = v[1] * 2.0;
-    const mstmm_complex t56 = mstmm_complex_scaled(t55, t17);
-    const mstmm_complex t57 = mstmm_complex_minus(t54, t56);
-    const mstmm_complex t58 = mstmm_complex_scaled(r[2], z_I[4]);
-    const double t59 = r[1] * w_I[1];
-    const double t60 = r[2] * w_I[2];
-    const double t61 = t59 + t60;
-    const mstmm_complex t62 = mstmm_complex_scaled(t61, z_I[0]);
-    const double t63 = r[0] * w_I[1];
-    const double t64 = 2.0 * t63;
-    const double t65 = r[1] * w_I[0];
-    const double t66 = t64 - t65;
-    const mstmm_complex t67 = mstmm_complex_scaled(t66, z_I[1]);
-    const double t68 = r[0] * w_I[2];
-    const double t69 = 2.0 * t68;
-    const double t70 = r[2] * w_I[0];
-    const double t71 = t69 - t70;
-    const mstmm_complex t72 = mstmm_complex_scaled(t71, z_I[2]);
-    const mstmm_complex t73 = mstmm_complex_plus(t67, t72);
-    const mstmm_complex t74 = mstmm_complex_minus(t62, t73);
-    const mstmm_complex t75 = mstmm_complex_scaled(r[1], z_I[5]);
-    const mstmm_complex t76 = mstmm_complex_minus(t74, t75);
-    const mstmm_complex t77 = mstmm_complex_plus(t58, t76);
-    const mstmm_complex t78 = mstmm_complex_plus(z_I[6], t77);
-    const mstmm_complex t79 = mstmm_complex_scaled(Rc[0], t78);
-    const mstmm_complex t80 = mstmm_complex_scaled(r[0], z_I[5]);
-    const double t81 = r[0] * w_I[0];
-    const double t82 = t60 + t81;
-    const mstmm_complex t83 = mstmm_complex_scaled(t82, z_I[1]);
-    const double t84 = 2.0 * t65;
-    const double t85 = t84 - t63;
-    const mstmm_complex t86 = mstmm_complex_scaled(t85, z_I[0]);
-    const mstmm_complex t87 = mstmm_complex_minus(t83, t86);
-    const double t88 = r[1] * w_I[2];
-    const double t89 = 2.0 * t88;
-    const double t90 = r[2] * w_I[1];
-    const double t91 = t89 - t90;
-    const mstmm_complex t92 = mstmm_complex_scaled(t91, z_I[2]);
-    const mstmm_complex t93 = mstmm_complex_minus(t87, t92);
-    const mstmm_complex t94 = mstmm_complex_plus(t80, t93);
-    const mstmm_complex t95 = mstmm_complex_scaled(r[2], z_I[3]);
-    const mstmm_complex t96 = mstmm_complex_minus(t94, t95);
-    const mstmm_complex t97 = mstmm_complex_plus(z_I[7], t96);
-    const mstmm_complex t98 = mstmm_complex_scaled(Rc[3], t97);
-    const mstmm_complex t99 = mstmm_complex_plus(t79, t98);
-    const mstmm_complex t100 = mstmm_complex_scaled(r[1], z_I[3]);
-    const double t101 = t59 + t81;
-    const mstmm_complex t102 = mstmm_complex_scaled(t101, z_I[2]);
-    const double t103 = 2.0 * t70;
-    const double t104 = t103 - t68;
-    const mstmm_complex t105 = mstmm_complex_scaled(t104, z_I[0]);
-    const mstmm_complex t106 = mstmm_complex_minus(t102, t105);
-    const double t107 = 2.0 * t90;
-    const double t108 = t107 - t88;
-    const mstmm_complex t109 = mstmm_complex_scaled(t108, z_I[1]);
-    const mstmm_complex t110 = mstmm_complex_minus(t106, t109);
-    const mstmm_complex t111 = mstmm_complex_scaled(r[0], z_I[4]);
-    const mstmm_complex t112 = mstmm_complex_minus(t110, t111);
-    const mstmm_complex t113 = mstmm_complex_plus(t100, t112);
-    const mstmm_complex t114 = mstmm_complex_plus(z_I[8], t113);
-    const mstmm_complex t115 = mstmm_complex_scaled(Rc[6], t114);
-    const mstmm_complex t116 = mstmm_complex_plus(t99, t115);
-    const mstmm_complex t117 = mstmm_complex_plus(t57, t116);
-    const mstmm_complex t118 = mstmm_complex_times(gain[6], t117);
-    const mstmm_complex t119 = mstmm_complex_plus(t52, t118);
-    const double t120 = v[0] * 2.0;
-    const mstmm_complex t121 = mstmm_complex_scaled(t120, t17);
-    const mstmm_complex t122 = mstmm_complex_scaled(t53, t4);
-    const mstmm_complex t123 = mstmm_complex_minus(t121, t122);
-    const mstmm_complex t124 = mstmm_complex_scaled(Rc[1], t78);
-    const mstmm_complex t125 = mstmm_complex_scaled(Rc[4], t97);
-    const mstmm_complex t126 = mstmm_complex_plus(t124, t125);
-    const mstmm_complex t127 = mstmm_complex_scaled(Rc[7], t114);
-    const mstmm_complex t128 = mstmm_complex_plus(t126, t127);
-    const mstmm_complex t129 = mstmm_complex_plus(t123, t128);
-    const mstmm_complex t130 = mstmm_complex_times(gain[7], t129);
-    const mstmm_complex t131 = mstmm_complex_plus(t119, t130);
-    const mstmm_complex t132 = mstmm_complex_scaled(t55, t4);
-    const mstmm_complex t133 = mstmm_complex_scaled(t120, t10);
-    const mstmm_complex t134 = mstmm_complex_minus(t132, t133);
-    const mstmm_complex t135 = mstmm_complex_scaled(Rc[2], t78);
-    const mstmm_complex t136 = mstmm_complex_scaled(Rc[5], t97);
-    const mstmm_complex t137 = mstmm_complex_plus(t135, t136);
-    const mstmm_complex t138 = mstmm_complex_scaled(Rc[8], t114);
-    const mstmm_complex t139 = mstmm_complex_plus(t137, t138);
-    const mstmm_complex t140 = mstmm_complex_plus(t134, t139);
-    const mstmm_complex t141 = mstmm_complex_times(gain[8], t140);
-    const mstmm_complex t142 = mstmm_complex_plus(t131, t141);
-    const mstmm_complex t143 = mstmm_complex_minus(y[0], t142);
-    x[0] = t143;
-    const mstmm_complex t144 = mstmm_complex_times(gain[9], t4);
-    const mstmm_complex t145 = mstmm_complex_times(gain[10], t10);
-    const mstmm_complex t146 = mstmm_complex_plus(t144, t145);
-    const mstmm_complex t147 = mstmm_complex_times(gain[11], t17);
-    const mstmm_complex t148 = mstmm_complex_plus(t146, t147);
-    const mstmm_complex t149 = mstmm_complex_times(gain[12], t28);
-    const mstmm_complex t150 = mstmm_complex_plus(t148, t149);
-    const mstmm_complex t151 = mstmm_complex_times(gain[13], t39);
-    const mstmm_complex t152 = mstmm_complex_plus(t150, t151);
-    const mstmm_complex t153 = mstmm_complex_times(gain[14], t50);
-    const mstmm_complex t154 = mstmm_complex_plus(t152, t153);
-    const mstmm_complex t155 = mstmm_complex_times(gain[15], t117);
-    const mstmm_complex t156 = mstmm_complex_plus(t154, t155);
-    const mstmm_complex t157 = mstmm_complex_times(gain[16], t129);
-    const mstmm_complex t158 = mstmm_complex_plus(t156, t157);
-    const mstmm_complex t159 = mstmm_complex_times(gain[17], t140);
-    const mstmm_complex t160 = mstmm_complex_plus(t158, t159);
-    const mstmm_complex t161 = mstmm_complex_minus(y[1], t160);
-    x[1] = t161;
-    const mstmm_complex t162 = mstmm_complex_times(gain[18], t4);
-    const mstmm_complex t163 = mstmm_complex_times(gain[19], t10);
-    const mstmm_complex t164 = mstmm_complex_plus(t162, t163);
-    const mstmm_complex t165 = mstmm_complex_times(gain[20], t17);
-    const mstmm_complex t166 = mstmm_complex_plus(t164, t165);
-    const mstmm_complex t167 = mstmm_complex_times(gain[21], t28);
-    const mstmm_complex t168 = mstmm_complex_plus(t166, t167);
-    const mstmm_complex t169 = mstmm_complex_times(gain[22], t39);
-    const mstmm_complex t170 = mstmm_complex_plus(t168, t169);
-    const mstmm_complex t171 = mstmm_complex_times(gain[23], t50);
-    const mstmm_complex t172 = mstmm_complex_plus(t170, t171);
-    const mstmm_complex t173 = mstmm_complex_times(gain[24], t117);
-    const mstmm_complex t174 = mstmm_complex_plus(t172, t173);
-    const mstmm_complex t175 = mstmm_complex_times(gain[25], t129);
-    const mstmm_complex t176 = mstmm_complex_plus(t174, t175);
-    const mstmm_complex t177 = mstmm_complex_times(gain[26], t140);
-    const mstmm_complex t178 = mstmm_complex_plus(t176, t177);
-    const mstmm_complex t179 = mstmm_complex_minus(y[2], t178);
-    x[2] = t179;
-    const mstmm_complex t180 = mstmm_complex_times(B[0], t143);
-    const mstmm_complex t181 = mstmm_complex_times(B[9], t161);
-    const mstmm_complex t182 = mstmm_complex_plus(t180, t181);
-    const mstmm_complex t183 = mstmm_complex_times(B[18], t179);
-    const mstmm_complex t184 = mstmm_complex_plus(t182, t183);
-    const mstmm_complex t185 = mstmm_complex_plus(t4, t184);
-    z[0] = t185;
-    const mstmm_complex t186 = mstmm_complex_times(B[1], t143);
-    const mstmm_complex t187 = mstmm_complex_times(B[10], t161);
-    const mstmm_complex t188 = mstmm_complex_plus(t186, t187);
-    const mstmm_complex t189 = mstmm_complex_times(B[19], t179);
-    const mstmm_complex t190 = mstmm_complex_plus(t188, t189);
-    const mstmm_complex t191 = mstmm_complex_plus(t10, t190);
-    z[1] = t191;
-    const mstmm_complex t192 = mstmm_complex_times(B[2], t143);
-    const mstmm_complex t193 = mstmm_complex_times(B[11], t161);
-    const mstmm_complex t194 = mstmm_complex_plus(t192, t193);
-    const mstmm_complex t195 = mstmm_complex_times(B[20], t179);
-    const mstmm_complex t196 = mstmm_complex_plus(t194, t195);
-    const mstmm_complex t197 = mstmm_complex_plus(t17, t196);
-    z[2] = t197;
-    const mstmm_complex t198 = mstmm_complex_times(B[3], t143);
-    const mstmm_complex t199 = mstmm_complex_times(B[12], t161);
-    const mstmm_complex t200 = mstmm_complex_plus(t198, t199);
-    const mstmm_complex t201 = mstmm_complex_times(B[21], t179);
-    const mstmm_complex t202 = mstmm_complex_plus(t200, t201);
-    const mstmm_complex t203 = mstmm_complex_plus(t28, t202);
-    z[3] = t203;
-    const mstmm_complex t204 = mstmm_complex_times(B[4], t143);
-    const mstmm_complex t205 = mstmm_complex_times(B[13], t161);
-    const mstmm_complex t206 = mstmm_complex_plus(t204, t205);
-    const mstmm_complex t207 = mstmm_complex_times(B[22], t179);
-    const mstmm_complex t208 = mstmm_complex_plus(t206, t207);
-    const mstmm_complex t209 = mstmm_complex_plus(t39, t208);
-    z[4] = t209;
-    const mstmm_complex t210 = mstmm_complex_times(B[5], t143);
-    const mstmm_complex t211 = mstmm_complex_times(B[14], t161);
-    const mstmm_complex t212 = mstmm_complex_plus(t210, t211);
-    const mstmm_complex t213 = mstmm_complex_times(B[23], t179);
-    const mstmm_complex t214 = mstmm_complex_plus(t212, t213);
-    const mstmm_complex t215 = mstmm_complex_plus(t50, t214);
-    z[5] = t215;
-    const mstmm_complex t216 = mstmm_complex_times(B[6], t143);
-    const mstmm_complex t217 = mstmm_complex_times(B[15], t161);
-    const mstmm_complex t218 = mstmm_complex_plus(t216, t217);
-    const mstmm_complex t219 = mstmm_complex_times(B[24], t179);
-    const mstmm_complex t220 = mstmm_complex_plus(t218, t219);
-    const mstmm_complex t221 = mstmm_complex_plus(t117, t220);
-    z[6] = t221;
-    const mstmm_complex t222 = mstmm_complex_times(B[7], t143);
-    const mstmm_complex t223 = mstmm_complex_times(B[16], t161);
-    const mstmm_complex t224 = mstmm_complex_plus(t222, t223);
-    const mstmm_complex t225 = mstmm_complex_times(B[25], t179);
-    const mstmm_complex t226 = mstmm_complex_plus(t224, t225);
-    const mstmm_complex t227 = mstmm_complex_plus(t129, t226);
-    z[7] = t227;
-    const mstmm_complex t228 = mstmm_complex_times(B[8], t143);
-    const mstmm_complex t229 = mstmm_complex_times(B[17], t161);
-    const mstmm_complex t230 = mstmm_complex_plus(t228, t229);
-    const mstmm_complex t231 = mstmm_complex_times(B[26], t179);
-    const mstmm_complex t232 = mstmm_complex_plus(t230, t231);
-    const mstmm_complex t233 = mstmm_complex_plus(t140, t232);
-    z[8] = t233;
-    return 0;
-}
-
-/* solution of a hinge with 4 free speeds for a right-hand side
- * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
- * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  Rc[3][3] rotation, body axes to parent axes
- * in  r[3] (m) P of the body from P of the parent, parent axes
- * in  w_I[3] (rad/s) angular velocity of the parent, parent axes
- * in  v[3] (m/s) relative velocity of the hinge, body axes
- * in  w[3] (rad/s) relative angular velocity of the hinge, body axes
- * in  z_I[9] change of the parent's motion, parent axes
- * in  B[4][9] motion along the unknowns
- * in  gain[4][9] D^-1 times the rows by the motion
- * in  y[4] D^-1 times the remainder of the rows
- * out x[4] unknowns
- * out z[9] change of the body's motion, own axes
- */
-static int mstmm_complex_sweep_generic4_tangent_answer(const double *restrict Rc, const double *restrict r,
-    const double *restrict w_I, const double *restrict v, const double *restrict w,
-    const mstmm_complex *restrict z_I, const mstmm_complex *restrict B, const mstmm_complex *restrict gain,
-    const mstmm_complex *restrict y, mstmm_complex *restrict x, mstmm_complex *restrict z)
-{
-    const mstmm_complex t0 = mstmm_complex_scaled(Rc[0], z_I[0]);
-    const mstmm_complex t1 = mstmm_complex_scaled(Rc[3], z_I[1]);
-    const mstmm_complex t2 = mstmm_complex_plus(t0, t1);
-    const mstmm_complex t3 = mstmm_complex_scaled(Rc[6], z_I[2]);
-    const mstmm_complex t4 = mstmm_complex_plus(t2, t3);
-    const mstmm_complex t5 = mstmm_complex_times(gain[0], t4);
-    const mstmm_complex t6 = mstmm_complex_scaled(Rc[1], z_I[0]);
-    const mstmm_complex t7 = mstmm_complex_scaled(Rc[4], z_I[1]);
-    const mstmm_complex t8 = mstmm_complex_plus(t6, t7);
-    const mstmm_complex t9 = mstmm_complex_scaled(Rc[7], z_I[2]);
-    const mstmm_complex t10 = mstmm_complex_plus(t8, t9);
-    const mstmm_complex t11 = mstmm_complex_times(gain[1], t10);
-    const mstmm_complex t12 = mstmm_complex_plus(t5, t11);
-    const mstmm_complex t13 = mstmm_complex_scaled(Rc[2], z_I[0]);
-    const mstmm_complex t14 = mstmm_complex_scaled(Rc[5], z_I[1]);
-    const mstmm_complex t15 = mstmm_complex_plus(t13, t14);
-    const mstmm_complex t16 = mstmm_complex_scaled(Rc[8], z_I[2]);
-    const mstmm_complex t17 = mstmm_complex_plus(t15, t16);
-    const mstmm_complex t18 = mstmm_complex_times(gain[2], t17);
-    const mstmm_complex t19 = mstmm_complex_plus(t12, t18);
-    const mstmm_complex t20 = mstmm_complex_scaled(w[2], t10);
-    const mstmm_complex t21 = mstmm_complex_scaled(w[1], t17);
-    const mstmm_complex t22 = mstmm_complex_minus(t20, t21);
-    const mstmm_complex t23 = mstmm_complex_scaled(Rc[0], z_I[3]);
-    const mstmm_complex t24 = mstmm_complex_scaled(Rc[3], z_I[4]);
-    const mstmm_complex t25 = mstmm_complex_plus(t23, t24);
-    const mstmm_complex t26 = mstmm_complex_scaled(Rc[6], z_I[5]);
-    const mstmm_complex t27 = mstmm_complex_plus(t25, t26);
-    const mstmm_complex t28 = mstmm_complex_plus(t22, t27);
-    const mstmm_complex t29 = mstmm_complex_times(gain[3], t28);
-    const mstmm_complex t30 = mstmm_complex_plus(t19, t29);
-    const mstmm_complex t31 = mstmm_complex_scaled(w[0], t17);
-    const mstmm_complex t32 = mstmm_complex_scaled(w[2], t4);
-    const mstmm_complex t33 = mstmm_complex_minus(t31, t32);
-    const mstmm_complex t34 = mstmm_complex_scaled(Rc[1], z_I[3]);
-    const mstmm_complex t35 = mstmm_complex_scaled(Rc[4], z_I[4]);
-    const mstmm_complex t36 = mstmm_complex_plus(t34, t35);
-    const mstmm_complex t37 = mstmm_complex_scaled(Rc[7], z_I[5]);
-    const mstmm_complex t38 = mstmm_complex_plus(t36, t37);
-    const mstmm_complex t39 = mstmm_complex_plus(t33, t38);
-    const mstmm_complex t40 = mstmm_complex_times(gain[4], t39);
-    const mstmm_complex t41 = mstmm_complex_plus(t30, t40);
-    const mstmm_complex t42 = mstmm_complex_scaled(w[1], t4);
-    const mstmm_complex t43 = mstmm_complex_scaled(w[0], t10);
-    const mstmm_complex t44 = mstmm_complex_minus(t42, t43);
-    const mstmm_complex t45 = mstmm_complex_scaled(Rc[2], z_I[3]);
-    const mstmm_complex t46 = mstmm_complex_scaled(Rc[5], z_I[4]);
-    const mstmm_complex t47 = mstmm_complex_plus(t45, t46);
-    const mstmm_complex t48 = mstmm_complex_scaled(Rc[8], z_I[5]);
-    const mstmm_complex t49 = mstmm_complex_plus(t47, t48);
-    const mstmm_complex t50 = mstmm_complex_plus(t44, t49);
-    const mstmm_complex t51 = mstmm_complex_times(gain[5], t50);
-    const mstmm_complex t52 = mstmm_complex_plus(t41, t51);
-    const double t53 = v[2] * 2.0;
-    const mstmm_complex t54 = mstmm_complex_scaled(t53, t10);
-    const double t55 = v[1] * 2.0;
-    const mstmm_complex t56 = mstmm_complex_scaled(t55, t17);
-    const mstmm_complex t57 = mstmm_complex_minus(t54, t56);
-    const mstmm_complex t58 = mstmm_complex_scaled(r[2], z_I[4]);
-    const double t59 = r[1] * w_I[1];
-    const double t60 = r[2] * w_I[2];
-    const double t61 = t59 + t60;
-    const mstmm_complex t62 = mstmm_complex_scaled(t61, z_I[0]);
-    const double t63 = r[0] * w_I[1];
-    const double t64 = 2.0 * t63;
-    const double t65 = r[1] * w_I[0];
-    const double t66 = t64 - t65;
-    const mstmm_complex t67 = mstmm_complex_scaled(t66, z_I[1]);
-    const double t68 = r[0] * w_I[2];
-    const double t69 = 2.0 * t68;
-    const double t70 = r[2] * w_I[0];
-    const double t71 = t69 - t70;
-    const mstmm_complex t72 = mstmm_complex_scaled(t71, z_I[2]);
-    const mstmm_complex t73 = mstmm_complex_plus(t67, t72);
-    const mstmm_complex t74 = mstmm_complex_minus(t62, t73);
-    const mstmm_complex t75 = mstmm_complex_scaled(r[1], z_I[5]);
-    const mstmm_complex t76 = mstmm_complex_minus(t74, t75);
-    const mstmm_complex t77 = mstmm_complex_plus(t58, t76);
-    const mstmm_complex t78 = mstmm_complex_plus(z_I[6], t77);
-    const mstmm_complex t79 = mstmm_complex_scaled(Rc[0], t78);
-    const mstmm_complex t80 = mstmm_complex_scaled(r[0], z_I[5]);
-    const double t81 = r[0] * w_I[0];
-    const double t82 = t60 + t81;
-    const mstmm_complex t83 = mstmm_complex_scaled(t82, z_I[1]);
-    const double t84 = 2.0 * t65;
-    const double t85 = t84 - t63;
-    const mstmm_complex t86 = mstmm_complex_scaled(t85, z_I[0]);
-    const mstmm_complex t87 = mstmm_complex_minus(t83, t86);
-    const double t88 = r[1] * w_I[2];
-    const double t89 = 2.0 * t88;
-    const double t90 = r[2] * w_I[1];
-    const double t91 = t89 - t90;
-    const mstmm_complex t92 = mstmm_complex_scaled(t91, z_I[2]);
-    const mstmm_complex t93 = mstmm_complex_minus(t87, t92);
-    const mstmm_complex t94 = mstmm_complex_plus(t80, t93);
-    const mstmm_complex t95 = mstmm_complex_scaled(r[2], z_I[3]);
-    const mstmm_complex t96 = mstmm_complex_minus(t94, t95);
-    const mstmm_complex t97 = mstmm_complex_plus(z_I[7], t96);
-    const mstmm_complex t98 = mstmm_complex_scaled(Rc[3], t97);
-    const mstmm_complex t99 = mstmm_complex_plus(t79, t98);
-    const mstmm_complex t100 = mstmm_complex_scaled(r[1], z_I[3]);
-    const double t101 = t59 + t81;
-    const mstmm_complex t102 = mstmm_complex_scaled(t101, z_I[2]);
-    const double t103 = 2.0 * t70;
-    const double t104 = t103 - t68;
-    const mstmm_complex t105 = mstmm_complex_scaled(t104, z_I[0]);
-    const mstmm_complex t106 = mstmm_complex_minus(t102, t105);
-    const double t107 = 2.0 * t90;
-    const double t108 = t107 - t88;
-    const mstmm_complex t109 = mstmm_complex_scaled(t108, z_I[1]);
-    const mstmm_complex t110 = mstmm_complex_minus(t106, t109);
-    const mstmm_complex t111 = mstmm_complex_scaled(r[0], z_I[4]);
-    const mstmm_complex t112 = mstmm_complex_minus(t110, t111);
-    const mstmm_complex t113 = mstmm_complex_plus(t100, t112);
-    const mstmm_complex t114 = mstmm_complex_plus(z_I[8], t113);
-    const mstmm_complex t115 = mstmm_complex_scaled(Rc[6], t114);
-    const mstmm_complex t116 = mstmm_complex_plus(t99, t115);
-    const mstmm_complex t117 = mstmm_complex_plus(t57, t116);
-    const mstmm_complex t118 = mstmm_complex_times(gain[6], t117);
-    const mstmm_complex t119 = mstmm_complex_plus(t52, t118);
-    const double t120 = v[0] * 2.0;
-    const mstmm_complex t121 = mstmm_complex_scaled(t120, t17);
-    const mstmm_complex t122 = mstmm_complex_scaled(t53, t4);
-    const mstmm_complex t123 = mstmm_complex_minus(t121, t122);
-    const mstmm_complex t124 = mstmm_complex_scaled(Rc[1], t78);
-    const mstmm_complex t125 = mstmm_complex_scaled(Rc[4], t97);
-    const mstmm_complex t126 = mstmm_complex_plus(t124, t125);
-    const mstmm_complex t127 = mstmm_complex_scaled(Rc[7], t114);
-    const mstmm_complex t128 = mstmm_complex_plus(t126, t127);
-    const mstmm_complex t129 = mstmm_complex_plus(t123, t128);
-    const mstmm_complex t130 = mstmm_complex_times(gain[7], t129);
-    const mstmm_complex t131 = mstmm_complex_plus(t119, t130);
-    const mstmm_complex t132 = mstmm_complex_scaled(t55, t4);
-    const mstmm_complex t133 = mstmm_complex_scaled(t120, t10);
-    const mstmm_complex t134 = mstmm_complex_minus(t132, t133);
-    const mstmm_complex t135 = mstmm_complex_scaled(Rc[2], t78);
-    const mstmm_complex t136 = mstmm_complex_scaled(Rc[5], t97);
-    const mstmm_complex t137 = mstmm_complex_plus(t135, t136);
-    const mstmm_complex t138 = mstmm_complex_scaled(Rc[8], t114);
-    const mstmm_complex t139 = mstmm_complex_plus(t137, t138);
-    const mstmm_complex t140 = mstmm_complex_plus(t134, t139);
-    const mstmm_complex t141 = mstmm_complex_times(gain[8], t140);
-    const mstmm_complex t142 = mstmm_complex_plus(t131, t141);
-    const mstmm_complex t143 = mstmm_complex_minus(y[0], t142);
-    x[0] = t143;
-    const mstmm_complex t144 = mstmm_complex_times(gain[9], t4);
-    const mstmm_complex t145 = mstmm_complex_times(gain[10], t10);
-    const mstmm_complex t146 = mstmm_complex_plus(t144, t145);
-    const mstmm_complex t147 = mstmm_complex_times(gain[11], t17);
-    const mstmm_complex t148 = mstmm_complex_plus(t146, t147);
-    const mstmm_complex t149 = mstmm_complex_times(gain[12], t28);
-    const mstmm_complex t150 = mstmm_complex_plus(t148, t149);
-    const mstmm_complex t151 = mstmm_complex_times(gain[13], t39);
-    const mstmm_complex t152 = mstmm_complex_plus(t150, t151);
-    const mstmm_complex t153 = mstmm_complex_times(gain[14], t50);
-    const mstmm_complex t154 = mstmm_complex_plus(t152, t153);
-    const mstmm_complex t155 = mstmm_complex_times(gain[15], t117);
-    const mstmm_complex t156 = mstmm_complex_plus(t154, t155);
-    const mstmm_complex t157 = mstmm_complex_times(gain[16], t129);
-    const mstmm_complex t158 = mstmm_complex_plus(t156, t157);
-    const mstmm_complex t159 = mstmm_complex_times(gain[17], t140);
-    const mstmm_complex t160 = mstmm_complex_plus(t158, t159);
-    const mstmm_complex t161 = mstmm_complex_minus(y[1], t160);
-    x[1] = t161;
-    const mstmm_complex t162 = mstmm_complex_times(gain[18], t4);
-    const mstmm_complex t163 = mstmm_complex_times(gain[19], t10);
-    const mstmm_complex t164 = mstmm_complex_plus(t162, t163);
-    const mstmm_complex t165 = mstmm_complex_times(gain[20], t17);
-    const mstmm_complex t166 = mstmm_complex_plus(t164, t165);
-    const mstmm_complex t167 = mstmm_complex_times(gain[21], t28);
-    const mstmm_complex t168 = mstmm_complex_plus(t166, t167);
-    const mstmm_complex t169 = mstmm_complex_times(gain[22], t39);
-    const mstmm_complex t170 = mstmm_complex_plus(t168, t169);
-    const mstmm_complex t171 = mstmm_complex_times(gain[23], t50);
-    const mstmm_complex t172 = mstmm_complex_plus(t170, t171);
-    const mstmm_complex t173 = mstmm_complex_times(gain[24], t117);
-    const mstmm_complex t174 = mstmm_complex_plus(t172, t173);
-    const mstmm_complex t175 = mstmm_complex_times(gain[25], t129);
-    const mstmm_complex t176 = mstmm_complex_plus(t174, t175);
-    const mstmm_complex t177 = mstmm_complex_times(gain[26], t140);
-    const mstmm_complex t178 = mstmm_complex_plus(t176, t177);
-    const mstmm_complex t179 = mstmm_complex_minus(y[2], t178);
-    x[2] = t179;
-    const mstmm_complex t180 = mstmm_complex_times(gain[27], t4);
-    const mstmm_complex t181 = mstmm_complex_times(gain[28], t10);
-    const mstmm_complex t182 = mstmm_complex_plus(t180, t181);
-    const mstmm_complex t183 = mstmm_complex_times(gain[29], t17);
-    const mstmm_complex t184 = mstmm_complex_plus(t182, t183);
-    const mstmm_complex t185 = mstmm_complex_times(gain[30], t28);
-    const mstmm_complex t186 = mstmm_complex_plus(t184, t185);
-    const mstmm_complex t187 = mstmm_complex_times(gain[31], t39);
-    const mstmm_complex t188 = mstmm_complex_plus(t186, t187);
-    const mstmm_complex t189 = mstmm_complex_times(gain[32], t50);
-    const mstmm_complex t190 = mstmm_complex_plus(t188, t189);
-    const mstmm_complex t191 = mstmm_complex_times(gain[33], t117);
-    const mstmm_complex t192 = mstmm_complex_plus(t190, t191);
-    const mstmm_complex t193 = mstmm_complex_times(gain[34], t129);
-    const mstmm_complex t194 = mstmm_complex_plus(t192, t193);
-    const mstmm_complex t195 = mstmm_complex_times(gain[35], t140);
-    const mstmm_complex t196 = mstmm_complex_plus(t194, t195);
-    const mstmm_complex t197 = mstmm_complex_minus(y[3], t196);
-    x[3] = t197;
-    const mstmm_complex t198 = mstmm_complex_times(B[0], t143);
-    const mstmm_complex t199 = mstmm_complex_times(B[9], t161);
-    const mstmm_complex t200 = mstmm_complex_plus(t198, t199);
-    const mstmm_complex t201 = mstmm_complex_times(B[18], t179);
-    const mstmm_complex t202 = mstmm_complex_plus(t200, t201);
-    const mstmm_complex t203 = mstmm_complex_times(B[27], t197);
-    const mstmm_complex t204 = mstmm_complex_plus(t202, t203);
-    const mstmm_complex t205 = mstmm_complex_plus(t4, t204);
-    z[0] = t205;
-    const mstmm_complex t206 = mstmm_complex_times(B[1], t143);
-    const mstmm_complex t207 = mstmm_complex_times(B[10], t161);
-    const mstmm_complex t208 = mstmm_complex_plus(t206, t207);
-    const mstmm_complex t209 = mstmm_complex_times(B[19], t179);
-    const mstmm_complex t210 = mstmm_complex_plus(t208, t209);
-    const mstmm_complex t211 = mstmm_complex_times(B[28], t197);
-    const mstmm_complex t212 = mstmm_complex_plus(t210, t211);
-    const mstmm_complex t213 = mstmm_complex_plus(t10, t212);
-    z[1] = t213;
-    const mstmm_complex t214 = mstmm_complex_times(B[2], t143);
-    const mstmm_complex t215 = mstmm_complex_times(B[11], t161);
-    const mstmm_complex t216 = mstmm_complex_plus(t214, t215);
-    const mstmm_complex t217 = mstmm_complex_times(B[20], t179);
-    const mstmm_complex t218 = mstmm_complex_plus(t216, t217);
-    const mstmm_complex t219 = mstmm_complex_times(B[29], t197);
-    const mstmm_complex t220 = mstmm_complex_plus(t218, t219);
-    const mstmm_complex t221 = mstmm_complex_plus(t17, t220);
-    z[2] = t221;
-    const mstmm_complex t222 = mstmm_complex_times(B[3], t143);
-    const mstmm_complex t223 = mstmm_complex_times(B[12], t161);
-    const mstmm_complex t224 = mstmm_complex_plus(t222, t223);
-    const mstmm_complex t225 = mstmm_complex_times(B[21], t179);
-    const mstmm_complex t226 = mstmm_complex_plus(t224, t225);
-    const mstmm_complex t227 = mstmm_complex_times(B[30], t197);
-    const mstmm_complex t228 = mstmm_complex_plus(t226, t227);
-    const mstmm_complex t229 = mstmm_complex_plus(t28, t228);
-    z[3] = t229;
-    const mstmm_complex t230 = mstmm_complex_times(B[4], t143);
-    const mstmm_complex t231 = mstmm_complex_times(B[13], t161);
-    const mstmm_complex t232 = mstmm_complex_plus(t230, t231);
-    const mstmm_complex t233 = mstmm_complex_times(B[22], t179);
-    const mstmm_complex t234 = mstmm_complex_plus(t232, t233);
-    const mstmm_complex t235 = mstmm_complex_times(B[31], t197);
-    const mstmm_complex t236 = mstmm_complex_plus(t234, t235);
-    const mstmm_complex t237 = mstmm_complex_plus(t39, t236);
-    z[4] = t237;
-    const mstmm_complex t238 = mstmm_complex_times(B[5], t143);
-    const mstmm_complex t239 = mstmm_complex_times(B[14], t161);
-    const mstmm_complex t240 = mstmm_complex_plus(t238, t239);
-    const mstmm_complex t241 = mstmm_complex_times(B[23], t179);
-    const mstmm_complex t242 = mstmm_complex_plus(t240, t241);
-    const mstmm_complex t243 = mstmm_complex_times(B[32], t197);
-    const mstmm_complex t244 = mstmm_complex_plus(t242, t243);
-    const mstmm_complex t245 = mstmm_complex_plus(t50, t244);
-    z[5] = t245;
-    const mstmm_complex t246 = mstmm_complex_times(B[6], t143);
-    const mstmm_complex t247 = mstmm_complex_times(B[15], t161);
-    const mstmm_complex t248 = mstmm_complex_plus(t246, t247);
-    const mstmm_complex t249 = mstmm_complex_times(B[24], t179);
-    const mstmm_complex t250 = mstmm_complex_plus(t248, t249);
-    const mstmm_complex t251 = mstmm_complex_times(B[33], t197);
-    const mstmm_complex t252 = mstmm_complex_plus(t250, t251);
-    const mstmm_complex t253 = mstmm_complex_plus(t117, t252);
-    z[6] = t253;
-    const mstmm_complex t254 = mstmm_complex_times(B[7], t143);
-    const mstmm_complex t255 = mstmm_complex_times(B[16], t161);
-    const mstmm_complex t256 = mstmm_complex_plus(t254, t255);
-    const mstmm_complex t257 = mstmm_complex_times(B[25], t179);
-    const mstmm_complex t258 = mstmm_complex_plus(t256, t257);
-    const mstmm_complex t259 = mstmm_complex_times(B[34], t197);
-    const mstmm_complex t260 = mstmm_complex_plus(t258, t259);
-    const mstmm_complex t261 = mstmm_complex_plus(t129, t260);
-    z[7] = t261;
-    const mstmm_complex t262 = mstmm_complex_times(B[8], t143);
-    const mstmm_complex t263 = mstmm_complex_times(B[17], t161);
-    const mstmm_complex t264 = mstmm_complex_plus(t262, t263);
-    const mstmm_complex t265 = mstmm_complex_times(B[26], t179);
-    const mstmm_complex t266 = mstmm_complex_plus(t264, t265);
-    const mstmm_complex t267 = mstmm_complex_times(B[35], t197);
-    const mstmm_complex t268 = mstmm_complex_plus(t266, t267);
-    const mstmm_complex t269 = mstmm_complex_plus(t140, t268);
-    z[8] = t269;
-    return 0;
-}
-
-/* solution of a hinge with 5 free speeds for a right-hand side
- * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
- * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  Rc[3][3] rotation, body axes to parent axes
- * in  r[3] (m) P of the body from P of the parent, parent axes
- * in  w_I[3] (rad/s) angular velocity of the parent, parent axes
- * in  v[3] (m/s) relative velocity of the hinge, body axes
- * in  w[3] (rad/s) relative angular velocity of the hinge, body axes
- * in  z_I[9] change of the parent's motion, parent axes
- * in  B[5][9] motion along the unknowns
- * in  gain[5][9] D^-1 times the rows by the motion
- * in  y[5] D^-1 times the remainder of the rows
- * out x[5] unknowns
- * out z[9] change of the body's motion, own axes
- */
-static int mstmm_complex_sweep_generic5_tangent_answer(const double *restrict Rc, const double *restrict r,
-    const double *restrict w_I, const double *restrict v, const double *restrict w,
-    const mstmm_complex *restrict z_I, const mstmm_complex *restrict B, const mstmm_complex *restrict gain,
-    const mstmm_complex *restrict y, mstmm_complex *restrict x, mstmm_complex *restrict z)
-{
-    const mstmm_complex t0 = mstmm_complex_scaled(Rc[0], z_I[0]);
-    const mstmm_complex t1 = mstmm_complex_scaled(Rc[3], z_I[1]);
-    const mstmm_complex t2 = mstmm_complex_plus(t0, t1);
-    const mstmm_complex t3 = mstmm_complex_scaled(Rc[6], z_I[2]);
-    const mstmm_complex t4 = mstmm_complex_plus(t2, t3);
-    const mstmm_complex t5 = mstmm_complex_times(gain[0], t4);
-    const mstmm_complex t6 = mstmm_complex_scaled(Rc[1], z_I[0]);
-    const mstmm_complex t7 = mstmm_complex_scaled(Rc[4], z_I[1]);
-    const mstmm_complex t8 = mstmm_complex_plus(t6, t7);
-    const mstmm_complex t9 = mstmm_complex_scaled(Rc[7], z_I[2]);
-    const mstmm_complex t10 = mstmm_complex_plus(t8, t9);
-    const mstmm_complex t11 = mstmm_complex_times(gain[1], t10);
-    const mstmm_complex t12 = mstmm_complex_plus(t5, t11);
-    const mstmm_complex t13 = mstmm_complex_scaled(Rc[2], z_I[0]);
-    const mstmm_complex t14 = mstmm_complex_scaled(Rc[5], z_I[1]);
-    const mstmm_complex t15 = mstmm_complex_plus(t13, t14);
-    const mstmm_complex t16 = mstmm_complex_scaled(Rc[8], z_I[2]);
-    const mstmm_complex t17 = mstmm_complex_plus(t15, t16);
-    const mstmm_complex t18 = mstmm_complex_times(gain[2], t17);
-    const mstmm_complex t19 = mstmm_complex_plus(t12, t18);
-    const mstmm_complex t20 = mstmm_complex_scaled(w[2], t10);
-    const mstmm_complex t21 = mstmm_complex_scaled(w[1], t17);
-    const mstmm_complex t22 = mstmm_complex_minus(t20, t21);
-    const mstmm_complex t23 = mstmm_complex_scaled(Rc[0], z_I[3]);
-    const mstmm_complex t24 = mstmm_complex_scaled(Rc[3], z_I[4]);
-    const mstmm_complex t25 = mstmm_complex_plus(t23, t24);
-    const mstmm_complex t26 = mstmm_complex_scaled(Rc[6], z_I[5]);
-    const mstmm_complex t27 = mstmm_complex_plus(t25, t26);
-    const mstmm_complex t28 = mstmm_complex_plus(t22, t27);
-    const mstmm_complex t29 = mstmm_complex_times(gain[3], t28);
-    const mstmm_complex t30 = mstmm_complex_plus(t19, t29);
-    const mstmm_complex t31 = mstmm_complex_scaled(w[0], t17);
-    const mstmm_complex t32 = mstmm_complex_scaled(w[2], t4);
-    const mstmm_complex t33 = mstmm_complex_minus(t31, t32);
-    const mstmm_complex t34 = mstmm_complex_scaled(Rc[1], z_I[3]);
-    const mstmm_complex t35 = mstmm_complex_scaled(Rc[4], z_I[4]);
-    const mstmm_complex t36 = mstmm_complex_plus(t34, t35);
-    const mstmm_complex t37 = mstmm_complex_scaled(Rc[7], z_I[5]);
-    const mstmm_complex t38 = mstmm_complex_plus(t36, t37);
-    const mstmm_complex t39 = mstmm_complex_plus(t33, t38);
-    const mstmm_complex t40 = mstmm_complex_times(gain[4], t39);
-    const mstmm_complex t41 = mstmm_complex_plus(t30, t40);
-    const mstmm_complex t42 = mstmm_complex_scaled(w[1], t4);
-    const mstmm_complex t43 = mstmm_complex_scaled(w[0], t10);
-    const mstmm_complex t44 = mstmm_complex_minus(t42, t43);
-    const mstmm_complex t45 = mstmm_complex_scaled(Rc[2], z_I[3]);
-    const mstmm_complex t46 = mstmm_complex_scaled(Rc[5], z_I[4]);
-    const mstmm_complex t47 = mstmm_complex_plus(t45, t46);
-    const mstmm_complex t48 = mstmm_complex_scaled(Rc[8], z_I[5]);
-    const mstmm_complex t49 = mstmm_complex_plus(t47, t48);
-    const mstmm_complex t50 = mstmm_complex_plus(t44, t49);
-    const mstmm_complex t51 = mstmm_complex_times(gain[5], t50);
-    const mstmm_complex t52 = mstmm_complex_plus(t41, t51);
-    const double t53 = v[2] * 2.0;
-    const mstmm_complex t54 = mstmm_complex_scaled(t53, t10);
-    const double t55 = v[1] * 2.0;
-    const mstmm_complex t56 = mstmm_complex_scaled(t55, t17);
-    const mstmm_complex t57 = mstmm_complex_minus(t54, t56);
-    const mstmm_complex t58 = mstmm_complex_scaled(r[2], z_I[4]);
-    const double t59 = r[1] * w_I[1];
-    const double t60 = r[2] * w_I[2];
-    const double t61 = t59 + t60;
-    const mstmm_complex t62 = mstmm_complex_scaled(t61, z_I[0]);
-    const double t63 = r[0] * w_I[1];
-    const double t64 = 2.0 * t63;
-    const double t65 = r[1] * w_I[0];
-    const double t66 = t64 - t65;
-    const mstmm_complex t67 = mstmm_complex_scaled(t66, z_I[1]);
-    const double t68 = r[0] * w_I[2];
-    const double t69 = 2.0 * t68;
-    const double t70 = r[2] * w_I[0];
-    const double t71 = t69 - t70;
-    const mstmm_complex t72 = mstmm_complex_scaled(t71, z_I[2]);
-    const mstmm_complex t73 = mstmm_complex_plus(t67, t72);
-    const mstmm_complex t74 = mstmm_complex_minus(t62, t73);
-    const mstmm_complex t75 = mstmm_complex_scaled(r[1], z_I[5]);
-    const mstmm_complex t76 = mstmm_complex_minus(t74, t75);
-    const mstmm_complex t77 = mstmm_complex_plus(t58, t76);
-    const mstmm_complex t78 = mstmm_complex_plus(z_I[6], t77);
-    const mstmm_complex t79 = mstmm_complex_scaled(Rc[0], t78);
-    const mstmm_complex t80 = mstmm_complex_scaled(r[0], z_I[5]);
-    const double t81 = r[0] * w_I[0];
-    const double t82 = t60 + t81;
-    const mstmm_complex t83 = mstmm_complex_scaled(t82, z_I[1]);
-    const double t84 = 2.0 * t65;
-    const double t85 = t84 - t63;
-    const mstmm_complex t86 = mstmm_complex_scaled(t85, z_I[0]);
-    const mstmm_complex t87 = mstmm_complex_minus(t83, t86);
-    const double t88 = r[1] * w_I[2];
-    const double t89 = 2.0 * t88;
-    const double t90 = r[2] * w_I[1];
-    const double t91 = t89 - t90;
-    const mstmm_complex t92 = mstmm_complex_scaled(t91, z_I[2]);
-    const mstmm_complex t93 = mstmm_complex_minus(t87, t92);
-    const mstmm_complex t94 = mstmm_complex_plus(t80, t93);
-    const mstmm_complex t95 = mstmm_complex_scaled(r[2], z_I[3]);
-    const mstmm_complex t96 = mstmm_complex_minus(t94, t95);
-    const mstmm_complex t97 = mstmm_complex_plus(z_I[7], t96);
-    const mstmm_complex t98 = mstmm_complex_scaled(Rc[3], t97);
-    const mstmm_complex t99 = mstmm_complex_plus(t79, t98);
-    const mstmm_complex t100 = mstmm_complex_scaled(r[1], z_I[3]);
-    const double t101 = t59 + t81;
-    const mstmm_complex t102 = mstmm_complex_scaled(t101, z_I[2]);
-    const double t103 = 2.0 * t70;
-    const double t104 = t103 - t68;
-    const mstmm_complex t105 = mstmm_complex_scaled(t104, z_I[0]);
-    const mstmm_complex t106 = mstmm_complex_minus(t102, t105);
-    const double t107 = 2.0 * t90;
-    const double t108 = t107 - t88;
-    const mstmm_complex t109 = mstmm_complex_scaled(t108, z_I[1]);
-    const mstmm_complex t110 = mstmm_complex_minus(t106, t109);
-    const mstmm_complex t111 = mstmm_complex_scaled(r[0], z_I[4]);
-    const mstmm_complex t112 = mstmm_complex_minus(t110, t111);
-    const mstmm_complex t113 = mstmm_complex_plus(t100, t112);
-    const mstmm_complex t114 = mstmm_complex_plus(z_I[8], t113);
-    const mstmm_complex t115 = mstmm_complex_scaled(Rc[6], t114);
-    const mstmm_complex t116 = mstmm_complex_plus(t99, t115);
-    const mstmm_complex t117 = mstmm_complex_plus(t57, t116);
-    const mstmm_complex t118 = mstmm_complex_times(gain[6], t117);
-    const mstmm_complex t119 = mstmm_complex_plus(t52, t118);
-    const double t120 = v[0] * 2.0;
-    const mstmm_complex t121 = mstmm_complex_scaled(t120, t17);
-    const mstmm_complex t122 = mstmm_complex_scaled(t53, t4);
-    const mstmm_complex t123 = mstmm_complex_minus(t121, t122);
-    const mstmm_complex t124 = mstmm_complex_scaled(Rc[1], t78);
-    const mstmm_complex t125 = mstmm_complex_scaled(Rc[4], t97);
-    const mstmm_complex t126 = mstmm_complex_plus(t124, t125);
-    const mstmm_complex t127 = mstmm_complex_scaled(Rc[7], t114);
-    const mstmm_complex t128 = mstmm_complex_plus(t126, t127);
-    const mstmm_complex t129 = mstmm_complex_plus(t123, t128);
-    const mstmm_complex t130 = mstmm_complex_times(gain[7], t129);
-    const mstmm_complex t131 = mstmm_complex_plus(t119, t130);
-    const mstmm_complex t132 = mstmm_complex_scaled(t55, t4);
-    const mstmm_complex t133 = mstmm_complex_scaled(t120, t10);
-    const mstmm_complex t134 = mstmm_complex_minus(t132, t133);
-    const mstmm_complex t135 = mstmm_complex_scaled(Rc[2], t78);
-    const mstmm_complex t136 = mstmm_complex_scaled(Rc[5], t97);
-    const mstmm_complex t137 = mstmm_complex_plus(t135, t136);
-    const mstmm_complex t138 = mstmm_complex_scaled(Rc[8], t114);
-    const mstmm_complex t139 = mstmm_complex_plus(t137, t138);
-    const mstmm_complex t140 = mstmm_complex_plus(t134, t139);
-    const mstmm_complex t141 = mstmm_complex_times(gain[8], t140);
-    const mstmm_complex t142 = mstmm_complex_plus(t131, t141);
-    const mstmm_complex t143 = mstmm_complex_minus(y[0], t142);
-    x[0] = t143;
-    const mstmm_complex t144 = mstmm_complex_times(gain[9], t4);
-    const mstmm_complex t145 = mstmm_complex_times(gain[10], t10);
-    const mstmm_complex t146 = mstmm_complex_plus(t144, t145);
-    const mstmm_complex t147 = mstmm_complex_times(gain[11], t17);
-    const mstmm_complex t148 = mstmm_complex_plus(t146, t147);
-    const mstmm_complex t149 = mstmm_complex_times(gain[12], t28);
-    const mstmm_complex t150 = mstmm_complex_plus(t148, t149);
-    const mstmm_complex t151 = mstmm_complex_times(gain[13], t39);
-    const mstmm_complex t152 = mstmm_complex_plus(t150, t151);
-    const mstmm_complex t153 = mstmm_complex_times(gain[14], t50);
-    const mstmm_complex t154 = mstmm_complex_plus(t152, t153);
-    const mstmm_complex t155 = mstmm_complex_times(gain[15], t117);
-    const mstmm_complex t156 = mstmm_complex_plus(t154, t155);
-    const mstmm_complex t157 = mstmm_complex_times(gain[16], t129);
-    const mstmm_complex t158 = mstmm_complex_plus(t156, t157);
-    const mstmm_complex t159 = mstmm_complex_times(gain[17], t140);
-    const mstmm_complex t160 = mstmm_complex_plus(t158, t159);
-    const mstmm_complex t161 = mstmm_complex_minus(y[1], t160);
-    x[1] = t161;
-    const mstmm_complex t162 = mstmm_complex_times(gain[18], t4);
-    const mstmm_complex t163 = mstmm_complex_times(gain[19], t10);
-    const mstmm_complex t164 = mstmm_complex_plus(t162, t163);
-    const mstmm_complex t165 = mstmm_complex_times(gain[20], t17);
-    const mstmm_complex t166 = mstmm_complex_plus(t164, t165);
-    const mstmm_complex t167 = mstmm_complex_times(gain[21], t28);
-    const mstmm_complex t168 = mstmm_complex_plus(t166, t167);
-    const mstmm_complex t169 = mstmm_complex_times(gain[22], t39);
-    const mstmm_complex t170 = mstmm_complex_plus(t168, t169);
-    const mstmm_complex t171 = mstmm_complex_times(gain[23], t50);
-    const mstmm_complex t172 = mstmm_complex_plus(t170, t171);
-    const mstmm_complex t173 = mstmm_complex_times(gain[24], t117);
-    const mstmm_complex t174 = mstmm_complex_plus(t172, t173);
-    const mstmm_complex t175 = mstmm_complex_times(gain[25], t129);
-    const mstmm_complex t176 = mstmm_complex_plus(t174, t175);
-    const mstmm_complex t177 = mstmm_complex_times(gain[26], t140);
-    const mstmm_complex t178 = mstmm_complex_plus(t176, t177);
-    const mstmm_complex t179 = mstmm_complex_minus(y[2], t178);
-    x[2] = t179;
-    const mstmm_complex t180 = mstmm_complex_times(gain[27], t4);
-    const mstmm_complex t181 = mstmm_complex_times(gain[28], t10);
-    const mstmm_complex t182 = mstmm_complex_plus(t180, t181);
-    const mstmm_complex t183 = mstmm_complex_times(gain[29], t17);
-    const mstmm_complex t184 = mstmm_complex_plus(t182, t183);
-    const mstmm_complex t185 = mstmm_complex_times(gain[30], t28);
-    const mstmm_complex t186 = mstmm_complex_plus(t184, t185);
-    const mstmm_complex t187 = mstmm_complex_times(gain[31], t39);
-    const mstmm_complex t188 = mstmm_complex_plus(t186, t187);
-    const mstmm_complex t189 = mstmm_complex_times(gain[32], t50);
-    const mstmm_complex t190 = mstmm_complex_plus(t188, t189);
-    const mstmm_complex t191 = mstmm_complex_times(gain[33], t117);
-    const mstmm_complex t192 = mstmm_complex_plus(t190, t191);
-    const mstmm_complex t193 = mstmm_complex_times(gain[34], t129);
-    const mstmm_complex t194 = mstmm_complex_plus(t192, t193);
-    const mstmm_complex t195 = mstmm_complex_times(gain[35], t140);
-    const mstmm_complex t196 = mstmm_complex_plus(t194, t195);
-    const mstmm_complex t197 = mstmm_complex_minus(y[3], t196);
-    x[3] = t197;
-    const mstmm_complex t198 = mstmm_complex_times(gain[36], t4);
-    const mstmm_complex t199 = mstmm_complex_times(gain[37], t10);
-    const mstmm_complex t200 = mstmm_complex_plus(t198, t199);
-    const mstmm_complex t201 = mstmm_complex_times(gain[38], t17);
-    const mstmm_complex t202 = mstmm_complex_plus(t200, t201);
-    const mstmm_complex t203 = mstmm_complex_times(gain[39], t28);
-    const mstmm_complex t204 = mstmm_complex_plus(t202, t203);
-    const mstmm_complex t205 = mstmm_complex_times(gain[40], t39);
-    const mstmm_complex t206 = mstmm_complex_plus(t204, t205);
-    const mstmm_complex t207 = mstmm_complex_times(gain[41], t50);
-    const mstmm_complex t208 = mstmm_complex_plus(t206, t207);
-    const mstmm_complex t209 = mstmm_complex_times(gain[42], t117);
-    const mstmm_complex t210 = mstmm_complex_plus(t208, t209);
-    const mstmm_complex t211 = mstmm_complex_times(gain[43], t129);
-    const mstmm_complex t212 = mstmm_complex_plus(t210, t211);
-    const mstmm_complex t213 = mstmm_complex_times(gain[44], t140);
-    const mstmm_complex t214 = mstmm_complex_plus(t212, t213);
-    const mstmm_complex t215 = mstmm_complex_minus(y[4], t214);
-    x[4] = t215;
-    const mstmm_complex t216 = mstmm_complex_times(B[0], t143);
-    const mstmm_complex t217 = mstmm_complex_times(B[9], t161);
-    const mstmm_complex t218 = mstmm_complex_plus(t216, t217);
-    const mstmm_complex t219 = mstmm_complex_times(B[18], t179);
-    const mstmm_complex t220 = mstmm_complex_plus(t218, t219);
-    const mstmm_complex t221 = mstmm_complex_times(B[27], t197);
-    const mstmm_complex t222 = mstmm_complex_plus(t220, t221);
-    const mstmm_complex t223 = mstmm_complex_times(B[36], t215);
-    const mstmm_complex t224 = mstmm_complex_plus(t222, t223);
-    const mstmm_complex t225 = mstmm_complex_plus(t4, t224);
-    z[0] = t225;
-    const mstmm_complex t226 = mstmm_complex_times(B[1], t143);
-    const mstmm_complex t227 = mstmm_complex_times(B[10], t161);
-    const mstmm_complex t228 = mstmm_complex_plus(t226, t227);
-    const mstmm_complex t229 = mstmm_complex_times(B[19], t179);
-    const mstmm_complex t230 = mstmm_complex_plus(t228, t229);
-    const mstmm_complex t231 = mstmm_complex_times(B[28], t197);
-    const mstmm_complex t232 = mstmm_complex_plus(t230, t231);
-    const mstmm_complex t233 = mstmm_complex_times(B[37], t215);
-    const mstmm_complex t234 = mstmm_complex_plus(t232, t233);
-    const mstmm_complex t235 = mstmm_complex_plus(t10, t234);
-    z[1] = t235;
-    const mstmm_complex t236 = mstmm_complex_times(B[2], t143);
-    const mstmm_complex t237 = mstmm_complex_times(B[11], t161);
-    const mstmm_complex t238 = mstmm_complex_plus(t236, t237);
-    const mstmm_complex t239 = mstmm_complex_times(B[20], t179);
-    const mstmm_complex t240 = mstmm_complex_plus(t238, t239);
-    const mstmm_complex t241 = mstmm_complex_times(B[29], t197);
-    const mstmm_complex t242 = mstmm_complex_plus(t240, t241);
-    const mstmm_complex t243 = mstmm_complex_times(B[38], t215);
-    const mstmm_complex t244 = mstmm_complex_plus(t242, t243);
-    const mstmm_complex t245 = mstmm_complex_plus(t17, t244);
-    z[2] = t245;
-    const mstmm_complex t246 = mstmm_complex_times(B[3], t143);
-    const mstmm_complex t247 = mstmm_complex_times(B[12], t161);
-    const mstmm_complex t248 = mstmm_complex_plus(t246, t247);
-    const mstmm_complex t249 = mstmm_complex_times(B[21], t179);
-    const mstmm_complex t250 = mstmm_complex_plus(t248, t249);
-    const mstmm_complex t251 = mstmm_complex_times(B[30], t197);
-    const mstmm_complex t252 = mstmm_complex_plus(t250, t251);
-    const mstmm_complex t253 = mstmm_complex_times(B[39], t215);
-    const mstmm_complex t254 = mstmm_complex_plus(t252, t253);
-    const mstmm_complex t255 = mstmm_complex_plus(t28, t254);
-    z[3] = t255;
-    const mstmm_complex t256 = mstmm_complex_times(B[4], t143);
-    const mstmm_complex t257 = mstmm_complex_times(B[13], t161);
-    const mstmm_complex t258 = mstmm_complex_plus(t256, t257);
-    const mstmm_complex t259 = mstmm_complex_times(B[22], t179);
-    const mstmm_complex t260 = mstmm_complex_plus(t258, t259);
-    const mstmm_complex t261 = mstmm_complex_times(B[31], t197);
-    const mstmm_complex t262 = mstmm_complex_plus(t260, t261);
-    const mstmm_complex t263 = mstmm_complex_times(B[40], t215);
-    const mstmm_complex t264 = mstmm_complex_plus(t262, t263);
-    const mstmm_complex t265 = mstmm_complex_plus(t39, t264);
-    z[4] = t265;
-    const mstmm_complex t266 = mstmm_complex_times(B[5], t143);
-    const mstmm_complex t267 = mstmm_complex_times(B[14], t161);
-    const mstmm_complex t268 = mstmm_complex_plus(t266, t267);
-    const mstmm_complex t269 = mstmm_complex_times(B[23], t179);
-    const mstmm_complex t270 = mstmm_complex_plus(t268, t269);
-    const mstmm_complex t271 = mstmm_complex_times(B[32], t197);
-    const mstmm_complex t272 = mstmm_complex_plus(t270, t271);
-    const mstmm_complex t273 = mstmm_complex_times(B[41], t215);
-    const mstmm_complex t274 = mstmm_complex_plus(t272, t273);
-    const mstmm_complex t275 = mstmm_complex_plus(t50, t274);
-    z[5] = t275;
-    const mstmm_complex t276 = mstmm_complex_times(B[6], t143);
-    const mstmm_complex t277 = mstmm_complex_times(B[15], t161);
-    const mstmm_complex t278 = mstmm_complex_plus(t276, t277);
-    const mstmm_complex t279 = mstmm_complex_times(B[24], t179);
-    const mstmm_complex t280 = mstmm_complex_plus(t278, t279);
-    const mstmm_complex t281 = mstmm_complex_times(B[33], t197);
-    const mstmm_complex t282 = mstmm_complex_plus(t280, t281);
-    const mstmm_complex t283 = mstmm_complex_times(B[42], t215);
-    const mstmm_complex t284 = mstmm_complex_plus(t282, t283);
-    const mstmm_complex t285 = mstmm_complex_plus(t117, t284);
-    z[6] = t285;
-    const mstmm_complex t286 = mstmm_complex_times(B[7], t143);
-    const mstmm_complex t287 = mstmm_complex_times(B[16], t161);
-    const mstmm_complex t288 = mstmm_complex_plus(t286, t287);
-    const mstmm_complex t289 = mstmm_complex_times(B[25], t179);
-    const mstmm_complex t290 = mstmm_complex_plus(t288, t289);
-    const mstmm_complex t291 = mstmm_complex_times(B[34], t197);
-    const mstmm_complex t292 = mstmm_complex_plus(t290, t291);
-    const mstmm_complex t293 = mstmm_complex_times(B[43], t215);
-    const mstmm_complex t294 = mstmm_complex_plus(t292, t293);
-    const mstmm_complex t295 = mstmm_complex_plus(t129, t294);
-    z[7] = t295;
-    const mstmm_complex t296 = mstmm_complex_times(B[8], t143);
-    const mstmm_complex t297 = mstmm_complex_times(B[17], t161);
-    const mstmm_complex t298 = mstmm_complex_plus(t296, t297);
-    const mstmm_complex t299 = mstmm_complex_times(B[26], t179);
-    const mstmm_complex t300 = mstmm_complex_plus(t298, t299);
-    const mstmm_complex t301 = mstmm_complex_times(B[35], t197);
-    const mstmm_complex t302 = mstmm_complex_plus(t300, t301);
-    const mstmm_complex t303 = mstmm_complex_times(B[44], t215);
-    const mstmm_complex t304 = mstmm_complex_plus(t302, t303);
-    const mstmm_complex t305 = mstmm_complex_plus(t140, t304);
-    z[8] = t305;
-    return 0;
-}
-
-/* solution of a hinge with 6 free speeds for a right-hand side
- * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
- * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  Rc[3][3] rotation, body axes to parent axes
- * in  r[3] (m) P of the body from P of the parent, parent axes
- * in  w_I[3] (rad/s) angular velocity of the parent, parent axes
- * in  v[3] (m/s) relative velocity of the hinge, body axes
- * in  w[3] (rad/s) relative angular velocity of the hinge, body axes
- * in  z_I[9] change of the parent's motion, parent axes
- * in  B[6][9] motion along the unknowns
- * in  gain[6][9] D^-1 times the rows by the motion
- * in  y[6] D^-1 times the remainder of the rows
- * out x[6] unknowns
- * out z[9] change of the body's motion, own axes
- */
-static int mstmm_complex_sweep_generic6_tangent_answer(const double *restrict Rc, const double *restrict r,
-    const double *restrict w_I, const double *restrict v, const double *restrict w,
-    const mstmm_complex *restrict z_I, const mstmm_complex *restrict B, const mstmm_complex *restrict gain,
-    const mstmm_complex *restrict y, mstmm_complex *restrict x, mstmm_complex *restrict z)
-{
-    const mstmm_complex t0 = mstmm_complex_scaled(Rc[0], z_I[0]);
-    const mstmm_complex t1 = mstmm_complex_scaled(Rc[3], z_I[1]);
-    const mstmm_complex t2 = mstmm_complex_plus(t0, t1);
-    const mstmm_complex t3 = mstmm_complex_scaled(Rc[6], z_I[2]);
-    const mstmm_complex t4 = mstmm_complex_plus(t2, t3);
-    const mstmm_complex t5 = mstmm_complex_times(gain[0], t4);
-    const mstmm_complex t6 = mstmm_complex_scaled(Rc[1], z_I[0]);
-    const mstmm_complex t7 = mstmm_complex_scaled(Rc[4], z_I[1]);
-    const mstmm_complex t8 = mstmm_complex_plus(t6, t7);
-    const mstmm_complex t9 = mstmm_complex_scaled(Rc[7], z_I[2]);
-    const mstmm_complex t10 = mstmm_complex_plus(t8, t9);
-    const mstmm_complex t11 = mstmm_complex_times(gain[1], t10);
-    const mstmm_complex t12 = mstmm_complex_plus(t5, t11);
-    const mstmm_complex t13 = mstmm_complex_scaled(Rc[2], z_I[0]);
-    const mstmm_complex t14 = mstmm_complex_scaled(Rc[5], z_I[1]);
-    const mstmm_complex t15 = mstmm_complex_plus(t13, t14);
-    const mstmm_complex t16 = mstmm_complex_scaled(Rc[8], z_I[2]);
-    const mstmm_complex t17 = mstmm_complex_plus(t15, t16);
-    const mstmm_complex t18 = mstmm_complex_times(gain[2], t17);
-    const mstmm_complex t19 = mstmm_complex_plus(t12, t18);
-    const mstmm_complex t20 = mstmm_complex_scaled(w[2], t10);
-    const mstmm_complex t21 = mstmm_complex_scaled(w[1], t17);
-    const mstmm_complex t22 = mstmm_complex_minus(t20, t21);
-    const mstmm_complex t23 = mstmm_complex_scaled(Rc[0], z_I[3]);
-    const mstmm_complex t24 = mstmm_complex_scaled(Rc[3], z_I[4]);
-    const mstmm_complex t25 = mstmm_complex_plus(t23, t24);
-    const mstmm_complex t26 = mstmm_complex_scaled(Rc[6], z_I[5]);
-    const mstmm_complex t27 = mstmm_complex_plus(t25, t26);
-    const mstmm_complex t28 = mstmm_complex_plus(t22, t27);
-    const mstmm_complex t29 = mstmm_complex_times(gain[3], t28);
-    const mstmm_complex t30 = mstmm_complex_plus(t19, t29);
-    const mstmm_complex t31 = mstmm_complex_scaled(w[0], t17);
-    const mstmm_complex t32 = mstmm_complex_scaled(w[2], t4);
-    const mstmm_complex t33 = mstmm_complex_minus(t31, t32);
-    const mstmm_complex t34 = mstmm_complex_scaled(Rc[1], z_I[3]);
-    const mstmm_complex t35 = mstmm_complex_scaled(Rc[4], z_I[4]);
-    const mstmm_complex t36 = mstmm_complex_plus(t34, t35);
-    const mstmm_complex t37 = mstmm_complex_scaled(Rc[7], z_I[5]);
-    const mstmm_complex t38 = mstmm_complex_plus(t36, t37);
-    const mstmm_complex t39 = mstmm_complex_plus(t33, t38);
-    const mstmm_complex t40 = mstmm_complex_times(gain[4], t39);
-    const mstmm_complex t41 = mstmm_complex_plus(t30, t40);
-    const mstmm_complex t42 = mstmm_complex_scaled(w[1], t4);
-    const mstmm_complex t43 = mstmm_complex_scaled(w[0], t10);
-    const mstmm_complex t44 = mstmm_complex_minus(t42, t43);
-    const mstmm_complex t45 = mstmm_complex_scaled(Rc[2], z_I[3]);
-    const mstmm_complex t46 = mstmm_complex_scaled(Rc[5], z_I[4]);
-    const mstmm_complex t47 = mstmm_complex_plus(t45, t46);
-    const mstmm_complex t48 = mstmm_complex_scaled(Rc[8], z_I[5]);
-    const mstmm_complex t49 = mstmm_complex_plus(t47, t48);
-    const mstmm_complex t50 = mstmm_complex_plus(t44, t49);
-    const mstmm_complex t51 = mstmm_complex_times(gain[5], t50);
-    const mstmm_complex t52 = mstmm_complex_plus(t41, t51);
-    const double t53 = v[2] * 2.0;
-    const mstmm_complex t54 = mstmm_complex_scaled(t53, t10);
-    const double t55 = v[1] * 2.0;
-    const mstmm_complex t56 = mstmm_complex_scaled(t55, t17);
-    const mstmm_complex t57 = mstmm_complex_minus(t54, t56);
-    const mstmm_complex t58 = mstmm_complex_scaled(r[2], z_I[4]);
-    const double t59 = r[1] * w_I[1];
-    const double t60 = r[2] * w_I[2];
-    const double t61 = t59 + t60;
-    const mstmm_complex t62 = mstmm_complex_scaled(t61, z_I[0]);
-    const double t63 = r[0] * w_I[1];
-    const double t64 = 2.0 * t63;
-    const double t65 = r[1] * w_I[0];
-    const double t66 = t64 - t65;
-    const mstmm_complex t67 = mstmm_complex_scaled(t66, z_I[1]);
-    const double t68 = r[0] * w_I[2];
-    const double t69 = 2.0 * t68;
-    const double t70 = r[2] * w_I[0];
-    const double t71 = t69 - t70;
-    const mstmm_complex t72 = mstmm_complex_scaled(t71, z_I[2]);
-    const mstmm_complex t73 = mstmm_complex_plus(t67, t72);
-    const mstmm_complex t74 = mstmm_complex_minus(t62, t73);
-    const mstmm_complex t75 = mstmm_complex_scaled(r[1], z_I[5]);
-    const mstmm_complex t76 = mstmm_complex_minus(t74, t75);
-    const mstmm_complex t77 = mstmm_complex_plus(t58, t76);
-    const mstmm_complex t78 = mstmm_complex_plus(z_I[6], t77);
-    const mstmm_complex t79 = mstmm_complex_scaled(Rc[0], t78);
-    const mstmm_complex t80 = mstmm_complex_scaled(r[0], z_I[5]);
-    const double t81 = r[0] * w_I[0];
-    const double t82 = t60 + t81;
-    const mstmm_complex t83 = mstmm_complex_scaled(t82, z_I[1]);
-    const double t84 = 2.0 * t65;
-    const double t85 = t84 - t63;
-    const mstmm_complex t86 = mstmm_complex_scaled(t85, z_I[0]);
-    const mstmm_complex t87 = mstmm_complex_minus(t83, t86);
-    const double t88 = r[1] * w_I[2];
-    const double t89 = 2.0 * t88;
-    const double t90 = r[2] * w_I[1];
-    const double t91 = t89 - t90;
-    const mstmm_complex t92 = mstmm_complex_scaled(t91, z_I[2]);
-    const mstmm_complex t93 = mstmm_complex_minus(t87, t92);
-    const mstmm_complex t94 = mstmm_complex_plus(t80, t93);
-    const mstmm_complex t95 = mstmm_complex_scaled(r[2], z_I[3]);
-    const mstmm_complex t96 = mstmm_complex_minus(t94, t95);
-    const mstmm_complex t97 = mstmm_complex_plus(z_I[7], t96);
-    const mstmm_complex t98 = mstmm_complex_scaled(Rc[3], t97);
-    const mstmm_complex t99 = mstmm_complex_plus(t79, t98);
-    const mstmm_complex t100 = mstmm_complex_scaled(r[1], z_I[3]);
-    const double t101 = t59 + t81;
-    const mstmm_complex t102 = mstmm_complex_scaled(t101, z_I[2]);
-    const double t103 = 2.0 * t70;
-    const double t104 = t103 - t68;
-    const mstmm_complex t105 = mstmm_complex_scaled(t104, z_I[0]);
-    const mstmm_complex t106 = mstmm_complex_minus(t102, t105);
-    const double t107 = 2.0 * t90;
-    const double t108 = t107 - t88;
-    const mstmm_complex t109 = mstmm_complex_scaled(t108, z_I[1]);
-    const mstmm_complex t110 = mstmm_complex_minus(t106, t109);
-    const mstmm_complex t111 = mstmm_complex_scaled(r[0], z_I[4]);
-    const mstmm_complex t112 = mstmm_complex_minus(t110, t111);
-    const mstmm_complex t113 = mstmm_complex_plus(t100, t112);
-    const mstmm_complex t114 = mstmm_complex_plus(z_I[8], t113);
-    const mstmm_complex t115 = mstmm_complex_scaled(Rc[6], t114);
-    const mstmm_complex t116 = mstmm_complex_plus(t99, t115);
-    const mstmm_complex t117 = mstmm_complex_plus(t57, t116);
-    const mstmm_complex t118 = mstmm_complex_times(gain[6], t117);
-    const mstmm_complex t119 = mstmm_complex_plus(t52, t118);
-    const double t120 = v[0] * 2.0;
-    const mstmm_complex t121 = mstmm_complex_scaled(t120, t17);
-    const mstmm_complex t122 = mstmm_complex_scaled(t53, t4);
-    const mstmm_complex t123 = mstmm_complex_minus(t121, t122);
-    const mstmm_complex t124 = mstmm_complex_scaled(Rc[1], t78);
-    const mstmm_complex t125 = mstmm_complex_scaled(Rc[4], t97);
-    const mstmm_complex t126 = mstmm_complex_plus(t124, t125);
-    const mstmm_complex t127 = mstmm_complex_scaled(Rc[7], t114);
-    const mstmm_complex t128 = mstmm_complex_plus(t126, t127);
-    const mstmm_complex t129 = mstmm_complex_plus(t123, t128);
-    const mstmm_complex t130 = mstmm_complex_times(gain[7], t129);
-    const mstmm_complex t131 = mstmm_complex_plus(t119, t130);
-    const mstmm_complex t132 = mstmm_complex_scaled(t55, t4);
-    const mstmm_complex t133 = mstmm_complex_scaled(t120, t10);
-    const mstmm_complex t134 = mstmm_complex_minus(t132, t133);
-    const mstmm_complex t135 = mstmm_complex_scaled(Rc[2], t78);
-    const mstmm_complex t136 = mstmm_complex_scaled(Rc[5], t97);
-    const mstmm_complex t137 = mstmm_complex_plus(t135, t136);
-    const mstmm_complex t138 = mstmm_complex_scaled(Rc[8], t114);
-    const mstmm_complex t139 = mstmm_complex_plus(t137, t138);
-    const mstmm_complex t140 = mstmm_complex_plus(t134, t139);
-    const mstmm_complex t141 = mstmm_complex_times(gain[8], t140);
-    const mstmm_complex t142 = mstmm_complex_plus(t131, t141);
-    const mstmm_complex t143 = mstmm_complex_minus(y[0], t142);
-    x[0] = t143;
-    const mstmm_complex t144 = mstmm_complex_times(gain[9], t4);
-    const mstmm_complex t145 = mstmm_complex_times(gain[10], t10);
-    const mstmm_complex t146 = mstmm_complex_plus(t144, t145);
-    const mstmm_complex t147 = mstmm_complex_times(gain[11], t17);
-    const mstmm_complex t148 = mstmm_complex_plus(t146, t147);
-    const mstmm_complex t149 = mstmm_complex_times(gain[12], t28);
-    const mstmm_complex t150 = mstmm_complex_plus(t148, t149);
-    const mstmm_complex t151 = mstmm_complex_times(gain[13], t39);
-    const mstmm_complex t152 = mstmm_complex_plus(t150, t151);
-    const mstmm_complex t153 = mstmm_complex_times(gain[14], t50);
-    const mstmm_complex t154 = mstmm_complex_plus(t152, t153);
-    const mstmm_complex t155 = mstmm_complex_times(gain[15], t117);
-    const mstmm_complex t156 = mstmm_complex_plus(t154, t155);
-    const mstmm_complex t157 = mstmm_complex_times(gain[16], t129);
-    const mstmm_complex t158 = mstmm_complex_plus(t156, t157);
-    const mstmm_complex t159 = mstmm_complex_times(gain[17], t140);
-    const mstmm_complex t160 = mstmm_complex_plus(t158, t159);
-    const mstmm_complex t161 = mstmm_complex_minus(y[1], t160);
-    x[1] = t161;
-    const mstmm_complex t162 = mstmm_complex_times(gain[18], t4);
-    const mstmm_complex t163 = mstmm_complex_times(gain[19], t10);
-    const mstmm_complex t164 = mstmm_complex_plus(t162, t163);
-    const mstmm_complex t165 = mstmm_complex_times(gain[20], t17);
-    const mstmm_complex t166 = mstmm_complex_plus(t164, t165);
-    const mstmm_complex t167 = mstmm_complex_times(gain[21], t28);
-    const mstmm_complex t168 = mstmm_complex_plus(t166, t167);
-    const mstmm_complex t169 = mstmm_complex_times(gain[22], t39);
-    const mstmm_complex t170 = mstmm_complex_plus(t168, t169);
-    const mstmm_complex t171 = mstmm_complex_times(gain[23], t50);
-    const mstmm_complex t172 = mstmm_complex_plus(t170, t171);
-    const mstmm_complex t173 = mstmm_complex_times(gain[24], t117);
-    const mstmm_complex t174 = mstmm_complex_plus(t172, t173);
-    const mstmm_complex t175 = mstmm_complex_times(gain[25], t129);
-    const mstmm_complex t176 = mstmm_complex_plus(t174, t175);
-    const mstmm_complex t177 = mstmm_complex_times(gain[26], t140);
-    const mstmm_complex t178 = mstmm_complex_plus(t176, t177);
-    const mstmm_complex t179 = mstmm_complex_minus(y[2], t178);
-    x[2] = t179;
-    const mstmm_complex t180 = mstmm_complex_times(gain[27], t4);
-    const mstmm_complex t181 = mstmm_complex_times(gain[28], t10);
-    const mstmm_complex t182 = mstmm_complex_plus(t180, t181);
-    const mstmm_complex t183 = mstmm_complex_times(gain[29], t17);
-    const mstmm_complex t184 = mstmm_complex_plus(t182, t183);
-    const mstmm_complex t185 = mstmm_complex_times(gain[30], t28);
-    const mstmm_complex t186 = mstmm_complex_plus(t184, t185);
-    const mstmm_complex t187 = mstmm_complex_times(gain[31], t39);
-    const mstmm_complex t188 = mstmm_complex_plus(t186, t187);
-    const mstmm_complex t189 = mstmm_complex_times(gain[32], t50);
-    const mstmm_complex t190 = mstmm_complex_plus(t188, t189);
-    const mstmm_complex t191 = mstmm_complex_times(gain[33], t117);
-    const mstmm_complex t192 = mstmm_complex_plus(t190, t191);
-    const mstmm_complex t193 = mstmm_complex_times(gain[34], t129);
-    const mstmm_complex t194 = mstmm_complex_plus(t192, t193);
-    const mstmm_complex t195 = mstmm_complex_times(gain[35], t140);
-    const mstmm_complex t196 = mstmm_complex_plus(t194, t195);
-    const mstmm_complex t197 = mstmm_complex_minus(y[3], t196);
-    x[3] = t197;
-    const mstmm_complex t198 = mstmm_complex_times(gain[36], t4);
-    const mstmm_complex t199 = mstmm_complex_times(gain[37], t10);
-    const mstmm_complex t200 = mstmm_complex_plus(t198, t199);
-    const mstmm_complex t201 = mstmm_complex_times(gain[38], t17);
-    const mstmm_complex t202 = mstmm_complex_plus(t200, t201);
-    const mstmm_complex t203 = mstmm_complex_times(gain[39], t28);
-    const mstmm_complex t204 = mstmm_complex_plus(t202, t203);
-    const mstmm_complex t205 = mstmm_complex_times(gain[40], t39);
-    const mstmm_complex t206 = mstmm_complex_plus(t204, t205);
-    const mstmm_complex t207 = mstmm_complex_times(gain[41], t50);
-    const mstmm_complex t208 = mstmm_complex_plus(t206, t207);
-    const mstmm_complex t209 = mstmm_complex_times(gain[42], t117);
-    const mstmm_complex t210 = mstmm_complex_plus(t208, t209);
-    const mstmm_complex t211 = mstmm_complex_times(gain[43], t129);
-    const mstmm_complex t212 = mstmm_complex_plus(t210, t211);
-    const mstmm_complex t213 = mstmm_complex_times(gain[44], t140);
-    const mstmm_complex t214 = mstmm_complex_plus(t212, t213);
-    const mstmm_complex t215 = mstmm_complex_minus(y[4], t214);
-    x[4] = t215;
-    const mstmm_complex t216 = mstmm_complex_times(gain[45], t4);
-    const mstmm_complex t217 = mstmm_complex_times(gain[46], t10);
-    const mstmm_complex t218 = mstmm_complex_plus(t216, t217);
-    const mstmm_complex t219 = mstmm_complex_times(gain[47], t17);
-    const mstmm_complex t220 = mstmm_complex_plus(t218, t219);
-    const mstmm_complex t221 = mstmm_complex_times(gain[48], t28);
-    const mstmm_complex t222 = mstmm_complex_plus(t220, t221);
-    const mstmm_complex t223 = mstmm_complex_times(gain[49], t39);
-    const mstmm_complex t224 = mstmm_complex_plus(t222, t223);
-    const mstmm_complex t225 = mstmm_complex_times(gain[50], t50);
-    const mstmm_complex t226 = mstmm_complex_plus(t224, t225);
-    const mstmm_complex t227 = mstmm_complex_times(gain[51], t117);
-    const mstmm_complex t228 = mstmm_complex_plus(t226, t227);
-    const mstmm_complex t229 = mstmm_complex_times(gain[52], t129);
-    const mstmm_complex t230 = mstmm_complex_plus(t228, t229);
-    const mstmm_complex t231 = mstmm_complex_times(gain[53], t140);
-    const mstmm_complex t232 = mstmm_complex_plus(t230, t231);
-    const mstmm_complex t233 = mstmm_complex_minus(y[5], t232);
-    x[5] = t233;
-    const mstmm_complex t234 = mstmm_complex_times(B[0], t143);
-    const mstmm_complex t235 = mstmm_complex_times(B[9], t161);
-    const mstmm_complex t236 = mstmm_complex_plus(t234, t235);
-    const mstmm_complex t237 = mstmm_complex_times(B[18], t179);
-    const mstmm_complex t238 = mstmm_complex_plus(t236, t237);
-    const mstmm_complex t239 = mstmm_complex_times(B[27], t197);
-    const mstmm_complex t240 = mstmm_complex_plus(t238, t239);
-    const mstmm_complex t241 = mstmm_complex_times(B[36], t215);
-    const mstmm_complex t242 = mstmm_complex_plus(t240, t241);
-    const mstmm_complex t243 = mstmm_complex_times(B[45], t233);
-    const mstmm_complex t244 = mstmm_complex_plus(t242, t243);
-    const mstmm_complex t245 = mstmm_complex_plus(t4, t244);
-    z[0] = t245;
-    const mstmm_complex t246 = mstmm_complex_times(B[1], t143);
-    const mstmm_complex t247 = mstmm_complex_times(B[10], t161);
-    const mstmm_complex t248 = mstmm_complex_plus(t246, t247);
-    const mstmm_complex t249 = mstmm_complex_times(B[19], t179);
-    const mstmm_complex t250 = mstmm_complex_plus(t248, t249);
-    const mstmm_complex t251 = mstmm_complex_times(B[28], t197);
-    const mstmm_complex t252 = mstmm_complex_plus(t250, t251);
-    const mstmm_complex t253 = mstmm_complex_times(B[37], t215);
-    const mstmm_complex t254 = mstmm_complex_plus(t252, t253);
-    const mstmm_complex t255 = mstmm_complex_times(B[46], t233);
-    const mstmm_complex t256 = mstmm_complex_plus(t254, t255);
-    const mstmm_complex t257 = mstmm_complex_plus(t10, t256);
-    z[1] = t257;
-    const mstmm_complex t258 = mstmm_complex_times(B[2], t143);
-    const mstmm_complex t259 = mstmm_complex_times(B[11], t161);
-    const mstmm_complex t260 = mstmm_complex_plus(t258, t259);
-    const mstmm_complex t261 = mstmm_complex_times(B[20], t179);
-    const mstmm_complex t262 = mstmm_complex_plus(t260, t261);
-    const mstmm_complex t263 = mstmm_complex_times(B[29], t197);
-    const mstmm_complex t264 = mstmm_complex_plus(t262, t263);
-    const mstmm_complex t265 = mstmm_complex_times(B[38], t215);
-    const mstmm_complex t266 = mstmm_complex_plus(t264, t265);
-    const mstmm_complex t267 = mstmm_complex_times(B[47], t233);
-    const mstmm_complex t268 = mstmm_complex_plus(t266, t267);
-    const mstmm_complex t269 = mstmm_complex_plus(t17, t268);
-    z[2] = t269;
-    const mstmm_complex t270 = mstmm_complex_times(B[3], t143);
-    const mstmm_complex t271 = mstmm_complex_times(B[12], t161);
-    const mstmm_complex t272 = mstmm_complex_plus(t270, t271);
-    const mstmm_complex t273 = mstmm_complex_times(B[21], t179);
-    const mstmm_complex t274 = mstmm_complex_plus(t272, t273);
-    const mstmm_complex t275 = mstmm_complex_times(B[30], t197);
-    const mstmm_complex t276 = mstmm_complex_plus(t274, t275);
-    const mstmm_complex t277 = mstmm_complex_times(B[39], t215);
-    const mstmm_complex t278 = mstmm_complex_plus(t276, t277);
-    const mstmm_complex t279 = mstmm_complex_times(B[48], t233);
-    const mstmm_complex t280 = mstmm_complex_plus(t278, t279);
-    const mstmm_complex t281 = mstmm_complex_plus(t28, t280);
-    z[3] = t281;
-    const mstmm_complex t282 = mstmm_complex_times(B[4], t143);
-    const mstmm_complex t283 = mstmm_complex_times(B[13], t161);
-    const mstmm_complex t284 = mstmm_complex_plus(t282, t283);
-    const mstmm_complex t285 = mstmm_complex_times(B[22], t179);
-    const mstmm_complex t286 = mstmm_complex_plus(t284, t285);
-    const mstmm_complex t287 = mstmm_complex_times(B[31], t197);
-    const mstmm_complex t288 = mstmm_complex_plus(t286, t287);
-    const mstmm_complex t289 = mstmm_complex_times(B[40], t215);
-    const mstmm_complex t290 = mstmm_complex_plus(t288, t289);
-    const mstmm_complex t291 = mstmm_complex_times(B[49], t233);
-    const mstmm_complex t292 = mstmm_complex_plus(t290, t291);
-    const mstmm_complex t293 = mstmm_complex_plus(t39, t292);
-    z[4] = t293;
-    const mstmm_complex t294 = mstmm_complex_times(B[5], t143);
-    const mstmm_complex t295 = mstmm_complex_times(B[14], t161);
-    const mstmm_complex t296 = mstmm_complex_plus(t294, t295);
-    const mstmm_complex t297 = mstmm_complex_times(B[23], t179);
-    const mstmm_complex t298 = mstmm_complex_plus(t296, t297);
-    const mstmm_complex t299 = mstmm_complex_times(B[32], t197);
-    const mstmm_complex t300 = mstmm_complex_plus(t298, t299);
-    const mstmm_complex t301 = mstmm_complex_times(B[41], t215);
-    const mstmm_complex t302 = mstmm_complex_plus(t300, t301);
-    const mstmm_complex t303 = mstmm_complex_times(B[50], t233);
-    const mstmm_complex t304 = mstmm_complex_plus(t302, t303);
-    const mstmm_complex t305 = mstmm_complex_plus(t50, t304);
-    z[5] = t305;
-    const mstmm_complex t306 = mstmm_complex_times(B[6], t143);
-    const mstmm_complex t307 = mstmm_complex_times(B[15], t161);
-    const mstmm_complex t308 = mstmm_complex_plus(t306, t307);
-    const mstmm_complex t309 = mstmm_complex_times(B[24], t179);
-    const mstmm_complex t310 = mstmm_complex_plus(t308, t309);
-    const mstmm_complex t311 = mstmm_complex_times(B[33], t197);
-    const mstmm_complex t312 = mstmm_complex_plus(t310, t311);
-    const mstmm_complex t313 = mstmm_complex_times(B[42], t215);
-    const mstmm_complex t314 = mstmm_complex_plus(t312, t313);
-    const mstmm_complex t315 = mstmm_complex_times(B[51], t233);
-    const mstmm_complex t316 = mstmm_complex_plus(t314, t315);
-    const mstmm_complex t317 = mstmm_complex_plus(t117, t316);
-    z[6] = t317;
-    const mstmm_complex t318 = mstmm_complex_times(B[7], t143);
-    const mstmm_complex t319 = mstmm_complex_times(B[16], t161);
-    const mstmm_complex t320 = mstmm_complex_plus(t318, t319);
-    const mstmm_complex t321 = mstmm_complex_times(B[25], t179);
-    const mstmm_complex t322 = mstmm_complex_plus(t320, t321);
-    const mstmm_complex t323 = mstmm_complex_times(B[34], t197);
-    const mstmm_complex t324 = mstmm_complex_plus(t322, t323);
-    const mstmm_complex t325 = mstmm_complex_times(B[43], t215);
-    const mstmm_complex t326 = mstmm_complex_plus(t324, t325);
-    const mstmm_complex t327 = mstmm_complex_times(B[52], t233);
-    const mstmm_complex t328 = mstmm_complex_plus(t326, t327);
-    const mstmm_complex t329 = mstmm_complex_plus(t129, t328);
-    z[7] = t329;
-    const mstmm_complex t330 = mstmm_complex_times(B[8], t143);
-    const mstmm_complex t331 = mstmm_complex_times(B[17], t161);
-    const mstmm_complex t332 = mstmm_complex_plus(t330, t331);
-    const mstmm_complex t333 = mstmm_complex_times(B[26], t179);
-    const mstmm_complex t334 = mstmm_complex_plus(t332, t333);
-    const mstmm_complex t335 = mstmm_complex_times(B[35], t197);
-    const mstmm_complex t336 = mstmm_complex_plus(t334, t335);
-    const mstmm_complex t337 = mstmm_complex_times(B[44], t215);
-    const mstmm_complex t338 = mstmm_complex_plus(t336, t337);
-    const mstmm_complex t339 = mstmm_complex_times(B[53], t233);
-    const mstmm_complex t340 = mstmm_complex_plus(t338, t339);
-    const mstmm_complex t341 = mstmm_complex_plus(t140, t340);
-    z[8] = t341;
-    return 0;
-}
-
 /* a right-hand side carried across a hinge with 1 free speed
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
@@ -4191,7 +2466,7 @@ static int mstmm_complex_sweep_generic6_tangent_answer(const double *restrict Rc
  * out y[1] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-static int mstmm_complex_sweep_generic1_tangent_push(const double *restrict Rc, const double *restrict r,
+static int mstmm_complex_sweep_generic1_tangent_load(const double *restrict Rc, const double *restrict r,
     const double *restrict H, const mstmm_complex *restrict V, const mstmm_complex *restrict inverse,
     const mstmm_complex *restrict e, const mstmm_complex *restrict e_f, mstmm_complex *restrict y, mstmm_complex *restrict e_I)
 {
@@ -4319,7 +2594,7 @@ static int mstmm_complex_sweep_generic1_tangent_push(const double *restrict Rc, 
  * out y[2] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-static int mstmm_complex_sweep_generic2_tangent_push(const double *restrict Rc, const double *restrict r,
+static int mstmm_complex_sweep_generic2_tangent_load(const double *restrict Rc, const double *restrict r,
     const double *restrict H, const mstmm_complex *restrict V, const mstmm_complex *restrict inverse,
     const mstmm_complex *restrict e, const mstmm_complex *restrict e_f, mstmm_complex *restrict y, mstmm_complex *restrict e_I)
 {
@@ -4478,7 +2753,7 @@ static int mstmm_complex_sweep_generic2_tangent_push(const double *restrict Rc, 
  * out y[3] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-static int mstmm_complex_sweep_generic3_tangent_push(const double *restrict Rc, const double *restrict r,
+static int mstmm_complex_sweep_generic3_tangent_load(const double *restrict Rc, const double *restrict r,
     const double *restrict H, const mstmm_complex *restrict V, const mstmm_complex *restrict inverse,
     const mstmm_complex *restrict e, const mstmm_complex *restrict e_f, mstmm_complex *restrict y, mstmm_complex *restrict e_I)
 {
@@ -4672,7 +2947,7 @@ static int mstmm_complex_sweep_generic3_tangent_push(const double *restrict Rc, 
  * out y[4] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-static int mstmm_complex_sweep_generic4_tangent_push(const double *restrict Rc, const double *restrict r,
+static int mstmm_complex_sweep_generic4_tangent_load(const double *restrict Rc, const double *restrict r,
     const double *restrict H, const mstmm_complex *restrict V, const mstmm_complex *restrict inverse,
     const mstmm_complex *restrict e, const mstmm_complex *restrict e_f, mstmm_complex *restrict y, mstmm_complex *restrict e_I)
 {
@@ -4905,7 +3180,7 @@ static int mstmm_complex_sweep_generic4_tangent_push(const double *restrict Rc, 
  * out y[5] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-static int mstmm_complex_sweep_generic5_tangent_push(const double *restrict Rc, const double *restrict r,
+static int mstmm_complex_sweep_generic5_tangent_load(const double *restrict Rc, const double *restrict r,
     const double *restrict H, const mstmm_complex *restrict V, const mstmm_complex *restrict inverse,
     const mstmm_complex *restrict e, const mstmm_complex *restrict e_f, mstmm_complex *restrict y, mstmm_complex *restrict e_I)
 {
@@ -5181,7 +3456,7 @@ static int mstmm_complex_sweep_generic5_tangent_push(const double *restrict Rc, 
  * out y[6] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-static int mstmm_complex_sweep_generic6_tangent_push(const double *restrict Rc, const double *restrict r,
+static int mstmm_complex_sweep_generic6_tangent_load(const double *restrict Rc, const double *restrict r,
     const double *restrict H, const mstmm_complex *restrict V, const mstmm_complex *restrict inverse,
     const mstmm_complex *restrict e, const mstmm_complex *restrict e_f, mstmm_complex *restrict y, mstmm_complex *restrict e_I)
 {
@@ -16005,6 +14280,1731 @@ static int mstmm_complex_sweep_generic6_tangent_rows(const double *restrict H, c
     return 0;
 }
 
+/* solution of a hinge with 1 free speed for a right-hand side
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  w_I[3] (rad/s) angular velocity of the parent, parent axes
+ * in  v[3] (m/s) relative velocity of the hinge, body axes
+ * in  w[3] (rad/s) relative angular velocity of the hinge, body axes
+ * in  z_I[9] change of the parent's motion, parent axes
+ * in  B[1][9] motion along the unknowns
+ * in  gain[1][9] D^-1 times the rows by the motion
+ * in  y[1] D^-1 times the remainder of the rows
+ * out x[1] unknowns
+ * out z[9] change of the body's motion, own axes
+ */
+static int mstmm_complex_sweep_generic1_tangent_solution(const double *restrict Rc, const double *restrict r,
+    const double *restrict w_I, const double *restrict v, const double *restrict w,
+    const mstmm_complex *restrict z_I, const mstmm_complex *restrict B, const mstmm_complex *restrict gain,
+    const mstmm_complex *restrict y, mstmm_complex *restrict x, mstmm_complex *restrict z)
+{
+    const mstmm_complex t0 = mstmm_complex_scaled(Rc[0], z_I[0]);
+    const mstmm_complex t1 = mstmm_complex_scaled(Rc[3], z_I[1]);
+    const mstmm_complex t2 = mstmm_complex_plus(t0, t1);
+    const mstmm_complex t3 = mstmm_complex_scaled(Rc[6], z_I[2]);
+    const mstmm_complex t4 = mstmm_complex_plus(t2, t3);
+    const mstmm_complex t5 = mstmm_complex_times(gain[0], t4);
+    const mstmm_complex t6 = mstmm_complex_scaled(Rc[1], z_I[0]);
+    const mstmm_complex t7 = mstmm_complex_scaled(Rc[4], z_I[1]);
+    const mstmm_complex t8 = mstmm_complex_plus(t6, t7);
+    const mstmm_complex t9 = mstmm_complex_scaled(Rc[7], z_I[2]);
+    const mstmm_complex t10 = mstmm_complex_plus(t8, t9);
+    const mstmm_complex t11 = mstmm_complex_times(gain[1], t10);
+    const mstmm_complex t12 = mstmm_complex_plus(t5, t11);
+    const mstmm_complex t13 = mstmm_complex_scaled(Rc[2], z_I[0]);
+    const mstmm_complex t14 = mstmm_complex_scaled(Rc[5], z_I[1]);
+    const mstmm_complex t15 = mstmm_complex_plus(t13, t14);
+    const mstmm_complex t16 = mstmm_complex_scaled(Rc[8], z_I[2]);
+    const mstmm_complex t17 = mstmm_complex_plus(t15, t16);
+    const mstmm_complex t18 = mstmm_complex_times(gain[2], t17);
+    const mstmm_complex t19 = mstmm_complex_plus(t12, t18);
+    const mstmm_complex t20 = mstmm_complex_scaled(w[2], t10);
+    const mstmm_complex t21 = mstmm_complex_scaled(w[1], t17);
+    const mstmm_complex t22 = mstmm_complex_minus(t20, t21);
+    const mstmm_complex t23 = mstmm_complex_scaled(Rc[0], z_I[3]);
+    const mstmm_complex t24 = mstmm_complex_scaled(Rc[3], z_I[4]);
+    const mstmm_complex t25 = mstmm_complex_plus(t23, t24);
+    const mstmm_complex t26 = mstmm_complex_scaled(Rc[6], z_I[5]);
+    const mstmm_complex t27 = mstmm_complex_plus(t25, t26);
+    const mstmm_complex t28 = mstmm_complex_plus(t22, t27);
+    const mstmm_complex t29 = mstmm_complex_times(gain[3], t28);
+    const mstmm_complex t30 = mstmm_complex_plus(t19, t29);
+    const mstmm_complex t31 = mstmm_complex_scaled(w[0], t17);
+    const mstmm_complex t32 = mstmm_complex_scaled(w[2], t4);
+    const mstmm_complex t33 = mstmm_complex_minus(t31, t32);
+    const mstmm_complex t34 = mstmm_complex_scaled(Rc[1], z_I[3]);
+    const mstmm_complex t35 = mstmm_complex_scaled(Rc[4], z_I[4]);
+    const mstmm_complex t36 = mstmm_complex_plus(t34, t35);
+    const mstmm_complex t37 = mstmm_complex_scaled(Rc[7], z_I[5]);
+    const mstmm_complex t38 = mstmm_complex_plus(t36, t37);
+    const mstmm_complex t39 = mstmm_complex_plus(t33, t38);
+    const mstmm_complex t40 = mstmm_complex_times(gain[4], t39);
+    const mstmm_complex t41 = mstmm_complex_plus(t30, t40);
+    const mstmm_complex t42 = mstmm_complex_scaled(w[1], t4);
+    const mstmm_complex t43 = mstmm_complex_scaled(w[0], t10);
+    const mstmm_complex t44 = mstmm_complex_minus(t42, t43);
+    const mstmm_complex t45 = mstmm_complex_scaled(Rc[2], z_I[3]);
+    const mstmm_complex t46 = mstmm_complex_scaled(Rc[5], z_I[4]);
+    const mstmm_complex t47 = mstmm_complex_plus(t45, t46);
+    const mstmm_complex t48 = mstmm_complex_scaled(Rc[8], z_I[5]);
+    const mstmm_complex t49 = mstmm_complex_plus(t47, t48);
+    const mstmm_complex t50 = mstmm_complex_plus(t44, t49);
+    const mstmm_complex t51 = mstmm_complex_times(gain[5], t50);
+    const mstmm_complex t52 = mstmm_complex_plus(t41, t51);
+    const double t53 = v[2] * 2.0;
+    const mstmm_complex t54 = mstmm_complex_scaled(t53, t10);
+    const double t55 = v[1] * 2.0;
+    const mstmm_complex t56 = mstmm_complex_scaled(t55, t17);
+    const mstmm_complex t57 = mstmm_complex_minus(t54, t56);
+    const mstmm_complex t58 = mstmm_complex_scaled(r[2], z_I[4]);
+    const double t59 = r[1] * w_I[1];
+    const double t60 = r[2] * w_I[2];
+    const double t61 = t59 + t60;
+    const mstmm_complex t62 = mstmm_complex_scaled(t61, z_I[0]);
+    const double t63 = r[0] * w_I[1];
+    const double t64 = 2.0 * t63;
+    const double t65 = r[1] * w_I[0];
+    const double t66 = t64 - t65;
+    const mstmm_complex t67 = mstmm_complex_scaled(t66, z_I[1]);
+    const double t68 = r[0] * w_I[2];
+    const double t69 = 2.0 * t68;
+    const double t70 = r[2] * w_I[0];
+    const double t71 = t69 - t70;
+    const mstmm_complex t72 = mstmm_complex_scaled(t71, z_I[2]);
+    const mstmm_complex t73 = mstmm_complex_plus(t67, t72);
+    const mstmm_complex t74 = mstmm_complex_minus(t62, t73);
+    const mstmm_complex t75 = mstmm_complex_scaled(r[1], z_I[5]);
+    const mstmm_complex t76 = mstmm_complex_minus(t74, t75);
+    const mstmm_complex t77 = mstmm_complex_plus(t58, t76);
+    const mstmm_complex t78 = mstmm_complex_plus(z_I[6], t77);
+    const mstmm_complex t79 = mstmm_complex_scaled(Rc[0], t78);
+    const mstmm_complex t80 = mstmm_complex_scaled(r[0], z_I[5]);
+    const double t81 = r[0] * w_I[0];
+    const double t82 = t60 + t81;
+    const mstmm_complex t83 = mstmm_complex_scaled(t82, z_I[1]);
+    const double t84 = 2.0 * t65;
+    const double t85 = t84 - t63;
+    const mstmm_complex t86 = mstmm_complex_scaled(t85, z_I[0]);
+    const mstmm_complex t87 = mstmm_complex_minus(t83, t86);
+    const double t88 = r[1] * w_I[2];
+    const double t89 = 2.0 * t88;
+    const double t90 = r[2] * w_I[1];
+    const double t91 = t89 - t90;
+    const mstmm_complex t92 = mstmm_complex_scaled(t91, z_I[2]);
+    const mstmm_complex t93 = mstmm_complex_minus(t87, t92);
+    const mstmm_complex t94 = mstmm_complex_plus(t80, t93);
+    const mstmm_complex t95 = mstmm_complex_scaled(r[2], z_I[3]);
+    const mstmm_complex t96 = mstmm_complex_minus(t94, t95);
+    const mstmm_complex t97 = mstmm_complex_plus(z_I[7], t96);
+    const mstmm_complex t98 = mstmm_complex_scaled(Rc[3], t97);
+    const mstmm_complex t99 = mstmm_complex_plus(t79, t98);
+    const mstmm_complex t100 = mstmm_complex_scaled(r[1], z_I[3]);
+    const double t101 = t59 + t81;
+    const mstmm_complex t102 = mstmm_complex_scaled(t101, z_I[2]);
+    const double t103 = 2.0 * t70;
+    const double t104 = t103 - t68;
+    const mstmm_complex t105 = mstmm_complex_scaled(t104, z_I[0]);
+    const mstmm_complex t106 = mstmm_complex_minus(t102, t105);
+    const double t107 = 2.0 * t90;
+    const double t108 = t107 - t88;
+    const mstmm_complex t109 = mstmm_complex_scaled(t108, z_I[1]);
+    const mstmm_complex t110 = mstmm_complex_minus(t106, t109);
+    const mstmm_complex t111 = mstmm_complex_scaled(r[0], z_I[4]);
+    const mstmm_complex t112 = mstmm_complex_minus(t110, t111);
+    const mstmm_complex t113 = mstmm_complex_plus(t100, t112);
+    const mstmm_complex t114 = mstmm_complex_plus(z_I[8], t113);
+    const mstmm_complex t115 = mstmm_complex_scaled(Rc[6], t114);
+    const mstmm_complex t116 = mstmm_complex_plus(t99, t115);
+    const mstmm_complex t117 = mstmm_complex_plus(t57, t116);
+    const mstmm_complex t118 = mstmm_complex_times(gain[6], t117);
+    const mstmm_complex t119 = mstmm_complex_plus(t52, t118);
+    const double t120 = v[0] * 2.0;
+    const mstmm_complex t121 = mstmm_complex_scaled(t120, t17);
+    const mstmm_complex t122 = mstmm_complex_scaled(t53, t4);
+    const mstmm_complex t123 = mstmm_complex_minus(t121, t122);
+    const mstmm_complex t124 = mstmm_complex_scaled(Rc[1], t78);
+    const mstmm_complex t125 = mstmm_complex_scaled(Rc[4], t97);
+    const mstmm_complex t126 = mstmm_complex_plus(t124, t125);
+    const mstmm_complex t127 = mstmm_complex_scaled(Rc[7], t114);
+    const mstmm_complex t128 = mstmm_complex_plus(t126, t127);
+    const mstmm_complex t129 = mstmm_complex_plus(t123, t128);
+    const mstmm_complex t130 = mstmm_complex_times(gain[7], t129);
+    const mstmm_complex t131 = mstmm_complex_plus(t119, t130);
+    const mstmm_complex t132 = mstmm_complex_scaled(t55, t4);
+    const mstmm_complex t133 = mstmm_complex_scaled(t120, t10);
+    const mstmm_complex t134 = mstmm_complex_minus(t132, t133);
+    const mstmm_complex t135 = mstmm_complex_scaled(Rc[2], t78);
+    const mstmm_complex t136 = mstmm_complex_scaled(Rc[5], t97);
+    const mstmm_complex t137 = mstmm_complex_plus(t135, t136);
+    const mstmm_complex t138 = mstmm_complex_scaled(Rc[8], t114);
+    const mstmm_complex t139 = mstmm_complex_plus(t137, t138);
+    const mstmm_complex t140 = mstmm_complex_plus(t134, t139);
+    const mstmm_complex t141 = mstmm_complex_times(gain[8], t140);
+    const mstmm_complex t142 = mstmm_complex_plus(t131, t141);
+    const mstmm_complex t143 = mstmm_complex_minus(y[0], t142);
+    x[0] = t143;
+    const mstmm_complex t144 = mstmm_complex_times(B[0], t143);
+    const mstmm_complex t145 = mstmm_complex_plus(t4, t144);
+    z[0] = t145;
+    const mstmm_complex t146 = mstmm_complex_times(B[1], t143);
+    const mstmm_complex t147 = mstmm_complex_plus(t10, t146);
+    z[1] = t147;
+    const mstmm_complex t148 = mstmm_complex_times(B[2], t143);
+    const mstmm_complex t149 = mstmm_complex_plus(t17, t148);
+    z[2] = t149;
+    const mstmm_complex t150 = mstmm_complex_times(B[3], t143);
+    const mstmm_complex t151 = mstmm_complex_plus(t28, t150);
+    z[3] = t151;
+    const mstmm_complex t152 = mstmm_complex_times(B[4], t143);
+    const mstmm_complex t153 = mstmm_complex_plus(t39, t152);
+    z[4] = t153;
+    const mstmm_complex t154 = mstmm_complex_times(B[5], t143);
+    const mstmm_complex t155 = mstmm_complex_plus(t50, t154);
+    z[5] = t155;
+    const mstmm_complex t156 = mstmm_complex_times(B[6], t143);
+    const mstmm_complex t157 = mstmm_complex_plus(t117, t156);
+    z[6] = t157;
+    const mstmm_complex t158 = mstmm_complex_times(B[7], t143);
+    const mstmm_complex t159 = mstmm_complex_plus(t129, t158);
+    z[7] = t159;
+    const mstmm_complex t160 = mstmm_complex_times(B[8], t143);
+    const mstmm_complex t161 = mstmm_complex_plus(t140, t160);
+    z[8] = t161;
+    return 0;
+}
+
+/* solution of a hinge with 2 free speeds for a right-hand side
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  w_I[3] (rad/s) angular velocity of the parent, parent axes
+ * in  v[3] (m/s) relative velocity of the hinge, body axes
+ * in  w[3] (rad/s) relative angular velocity of the hinge, body axes
+ * in  z_I[9] change of the parent's motion, parent axes
+ * in  B[2][9] motion along the unknowns
+ * in  gain[2][9] D^-1 times the rows by the motion
+ * in  y[2] D^-1 times the remainder of the rows
+ * out x[2] unknowns
+ * out z[9] change of the body's motion, own axes
+ */
+static int mstmm_complex_sweep_generic2_tangent_solution(const double *restrict Rc, const double *restrict r,
+    const double *restrict w_I, const double *restrict v, const double *restrict w,
+    const mstmm_complex *restrict z_I, const mstmm_complex *restrict B, const mstmm_complex *restrict gain,
+    const mstmm_complex *restrict y, mstmm_complex *restrict x, mstmm_complex *restrict z)
+{
+    const mstmm_complex t0 = mstmm_complex_scaled(Rc[0], z_I[0]);
+    const mstmm_complex t1 = mstmm_complex_scaled(Rc[3], z_I[1]);
+    const mstmm_complex t2 = mstmm_complex_plus(t0, t1);
+    const mstmm_complex t3 = mstmm_complex_scaled(Rc[6], z_I[2]);
+    const mstmm_complex t4 = mstmm_complex_plus(t2, t3);
+    const mstmm_complex t5 = mstmm_complex_times(gain[0], t4);
+    const mstmm_complex t6 = mstmm_complex_scaled(Rc[1], z_I[0]);
+    const mstmm_complex t7 = mstmm_complex_scaled(Rc[4], z_I[1]);
+    const mstmm_complex t8 = mstmm_complex_plus(t6, t7);
+    const mstmm_complex t9 = mstmm_complex_scaled(Rc[7], z_I[2]);
+    const mstmm_complex t10 = mstmm_complex_plus(t8, t9);
+    const mstmm_complex t11 = mstmm_complex_times(gain[1], t10);
+    const mstmm_complex t12 = mstmm_complex_plus(t5, t11);
+    const mstmm_complex t13 = mstmm_complex_scaled(Rc[2], z_I[0]);
+    const mstmm_complex t14 = mstmm_complex_scaled(Rc[5], z_I[1]);
+    const mstmm_complex t15 = mstmm_complex_plus(t13, t14);
+    const mstmm_complex t16 = mstmm_complex_scaled(Rc[8], z_I[2]);
+    const mstmm_complex t17 = mstmm_complex_plus(t15, t16);
+    const mstmm_complex t18 = mstmm_complex_times(gain[2], t17);
+    const mstmm_complex t19 = mstmm_complex_plus(t12, t18);
+    const mstmm_complex t20 = mstmm_complex_scaled(w[2], t10);
+    const mstmm_complex t21 = mstmm_complex_scaled(w[1], t17);
+    const mstmm_complex t22 = mstmm_complex_minus(t20, t21);
+    const mstmm_complex t23 = mstmm_complex_scaled(Rc[0], z_I[3]);
+    const mstmm_complex t24 = mstmm_complex_scaled(Rc[3], z_I[4]);
+    const mstmm_complex t25 = mstmm_complex_plus(t23, t24);
+    const mstmm_complex t26 = mstmm_complex_scaled(Rc[6], z_I[5]);
+    const mstmm_complex t27 = mstmm_complex_plus(t25, t26);
+    const mstmm_complex t28 = mstmm_complex_plus(t22, t27);
+    const mstmm_complex t29 = mstmm_complex_times(gain[3], t28);
+    const mstmm_complex t30 = mstmm_complex_plus(t19, t29);
+    const mstmm_complex t31 = mstmm_complex_scaled(w[0], t17);
+    const mstmm_complex t32 = mstmm_complex_scaled(w[2], t4);
+    const mstmm_complex t33 = mstmm_complex_minus(t31, t32);
+    const mstmm_complex t34 = mstmm_complex_scaled(Rc[1], z_I[3]);
+    const mstmm_complex t35 = mstmm_complex_scaled(Rc[4], z_I[4]);
+    const mstmm_complex t36 = mstmm_complex_plus(t34, t35);
+    const mstmm_complex t37 = mstmm_complex_scaled(Rc[7], z_I[5]);
+    const mstmm_complex t38 = mstmm_complex_plus(t36, t37);
+    const mstmm_complex t39 = mstmm_complex_plus(t33, t38);
+    const mstmm_complex t40 = mstmm_complex_times(gain[4], t39);
+    const mstmm_complex t41 = mstmm_complex_plus(t30, t40);
+    const mstmm_complex t42 = mstmm_complex_scaled(w[1], t4);
+    const mstmm_complex t43 = mstmm_complex_scaled(w[0], t10);
+    const mstmm_complex t44 = mstmm_complex_minus(t42, t43);
+    const mstmm_complex t45 = mstmm_complex_scaled(Rc[2], z_I[3]);
+    const mstmm_complex t46 = mstmm_complex_scaled(Rc[5], z_I[4]);
+    const mstmm_complex t47 = mstmm_complex_plus(t45, t46);
+    const mstmm_complex t48 = mstmm_complex_scaled(Rc[8], z_I[5]);
+    const mstmm_complex t49 = mstmm_complex_plus(t47, t48);
+    const mstmm_complex t50 = mstmm_complex_plus(t44, t49);
+    const mstmm_complex t51 = mstmm_complex_times(gain[5], t50);
+    const mstmm_complex t52 = mstmm_complex_plus(t41, t51);
+    const double t53 = v[2] * 2.0;
+    const mstmm_complex t54 = mstmm_complex_scaled(t53, t10);
+    const double t55 = v[1] * 2.0;
+    const mstmm_complex t56 = mstmm_complex_scaled(t55, t17);
+    const mstmm_complex t57 = mstmm_complex_minus(t54, t56);
+    const mstmm_complex t58 = mstmm_complex_scaled(r[2], z_I[4]);
+    const double t59 = r[1] * w_I[1];
+    const double t60 = r[2] * w_I[2];
+    const double t61 = t59 + t60;
+    const mstmm_complex t62 = mstmm_complex_scaled(t61, z_I[0]);
+    const double t63 = r[0] * w_I[1];
+    const double t64 = 2.0 * t63;
+    const double t65 = r[1] * w_I[0];
+    const double t66 = t64 - t65;
+    const mstmm_complex t67 = mstmm_complex_scaled(t66, z_I[1]);
+    const double t68 = r[0] * w_I[2];
+    const double t69 = 2.0 * t68;
+    const double t70 = r[2] * w_I[0];
+    const double t71 = t69 - t70;
+    const mstmm_complex t72 = mstmm_complex_scaled(t71, z_I[2]);
+    const mstmm_complex t73 = mstmm_complex_plus(t67, t72);
+    const mstmm_complex t74 = mstmm_complex_minus(t62, t73);
+    const mstmm_complex t75 = mstmm_complex_scaled(r[1], z_I[5]);
+    const mstmm_complex t76 = mstmm_complex_minus(t74, t75);
+    const mstmm_complex t77 = mstmm_complex_plus(t58, t76);
+    const mstmm_complex t78 = mstmm_complex_plus(z_I[6], t77);
+    const mstmm_complex t79 = mstmm_complex_scaled(Rc[0], t78);
+    const mstmm_complex t80 = mstmm_complex_scaled(r[0], z_I[5]);
+    const double t81 = r[0] * w_I[0];
+    const double t82 = t60 + t81;
+    const mstmm_complex t83 = mstmm_complex_scaled(t82, z_I[1]);
+    const double t84 = 2.0 * t65;
+    const double t85 = t84 - t63;
+    const mstmm_complex t86 = mstmm_complex_scaled(t85, z_I[0]);
+    const mstmm_complex t87 = mstmm_complex_minus(t83, t86);
+    const double t88 = r[1] * w_I[2];
+    const double t89 = 2.0 * t88;
+    const double t90 = r[2] * w_I[1];
+    const double t91 = t89 - t90;
+    const mstmm_complex t92 = mstmm_complex_scaled(t91, z_I[2]);
+    const mstmm_complex t93 = mstmm_complex_minus(t87, t92);
+    const mstmm_complex t94 = mstmm_complex_plus(t80, t93);
+    const mstmm_complex t95 = mstmm_complex_scaled(r[2], z_I[3]);
+    const mstmm_complex t96 = mstmm_complex_minus(t94, t95);
+    const mstmm_complex t97 = mstmm_complex_plus(z_I[7], t96);
+    const mstmm_complex t98 = mstmm_complex_scaled(Rc[3], t97);
+    const mstmm_complex t99 = mstmm_complex_plus(t79, t98);
+    const mstmm_complex t100 = mstmm_complex_scaled(r[1], z_I[3]);
+    const double t101 = t59 + t81;
+    const mstmm_complex t102 = mstmm_complex_scaled(t101, z_I[2]);
+    const double t103 = 2.0 * t70;
+    const double t104 = t103 - t68;
+    const mstmm_complex t105 = mstmm_complex_scaled(t104, z_I[0]);
+    const mstmm_complex t106 = mstmm_complex_minus(t102, t105);
+    const double t107 = 2.0 * t90;
+    const double t108 = t107 - t88;
+    const mstmm_complex t109 = mstmm_complex_scaled(t108, z_I[1]);
+    const mstmm_complex t110 = mstmm_complex_minus(t106, t109);
+    const mstmm_complex t111 = mstmm_complex_scaled(r[0], z_I[4]);
+    const mstmm_complex t112 = mstmm_complex_minus(t110, t111);
+    const mstmm_complex t113 = mstmm_complex_plus(t100, t112);
+    const mstmm_complex t114 = mstmm_complex_plus(z_I[8], t113);
+    const mstmm_complex t115 = mstmm_complex_scaled(Rc[6], t114);
+    const mstmm_complex t116 = mstmm_complex_plus(t99, t115);
+    const mstmm_complex t117 = mstmm_complex_plus(t57, t116);
+    const mstmm_complex t118 = mstmm_complex_times(gain[6], t117);
+    const mstmm_complex t119 = mstmm_complex_plus(t52, t118);
+    const double t120 = v[0] * 2.0;
+    const mstmm_complex t121 = mstmm_complex_scaled(t120, t17);
+    const mstmm_complex t122 = mstmm_complex_scaled(t53, t4);
+    const mstmm_complex t123 = mstmm_complex_minus(t121, t122);
+    const mstmm_complex t124 = mstmm_complex_scaled(Rc[1], t78);
+    const mstmm_complex t125 = mstmm_complex_scaled(Rc[4], t97);
+    const mstmm_complex t126 = mstmm_complex_plus(t124, t125);
+    const mstmm_complex t127 = mstmm_complex_scaled(Rc[7], t114);
+    const mstmm_complex t128 = mstmm_complex_plus(t126, t127);
+    const mstmm_complex t129 = mstmm_complex_plus(t123, t128);
+    const mstmm_complex t130 = mstmm_complex_times(gain[7], t129);
+    const mstmm_complex t131 = mstmm_complex_plus(t119, t130);
+    const mstmm_complex t132 = mstmm_complex_scaled(t55, t4);
+    const mstmm_complex t133 = mstmm_complex_scaled(t120, t10);
+    const mstmm_complex t134 = mstmm_complex_minus(t132, t133);
+    const mstmm_complex t135 = mstmm_complex_scaled(Rc[2], t78);
+    const mstmm_complex t136 = mstmm_complex_scaled(Rc[5], t97);
+    const mstmm_complex t137 = mstmm_complex_plus(t135, t136);
+    const mstmm_complex t138 = mstmm_complex_scaled(Rc[8], t114);
+    const mstmm_complex t139 = mstmm_complex_plus(t137, t138);
+    const mstmm_complex t140 = mstmm_complex_plus(t134, t139);
+    const mstmm_complex t141 = mstmm_complex_times(gain[8], t140);
+    const mstmm_complex t142 = mstmm_complex_plus(t131, t141);
+    const mstmm_complex t143 = mstmm_complex_minus(y[0], t142);
+    x[0] = t143;
+    const mstmm_complex t144 = mstmm_complex_times(gain[9], t4);
+    const mstmm_complex t145 = mstmm_complex_times(gain[10], t10);
+    const mstmm_complex t146 = mstmm_complex_plus(t144, t145);
+    const mstmm_complex t147 = mstmm_complex_times(gain[11], t17);
+    const mstmm_complex t148 = mstmm_complex_plus(t146, t147);
+    const mstmm_complex t149 = mstmm_complex_times(gain[12], t28);
+    const mstmm_complex t150 = mstmm_complex_plus(t148, t149);
+    const mstmm_complex t151 = mstmm_complex_times(gain[13], t39);
+    const mstmm_complex t152 = mstmm_complex_plus(t150, t151);
+    const mstmm_complex t153 = mstmm_complex_times(gain[14], t50);
+    const mstmm_complex t154 = mstmm_complex_plus(t152, t153);
+    const mstmm_complex t155 = mstmm_complex_times(gain[15], t117);
+    const mstmm_complex t156 = mstmm_complex_plus(t154, t155);
+    const mstmm_complex t157 = mstmm_complex_times(gain[16], t129);
+    const mstmm_complex t158 = mstmm_complex_plus(t156, t157);
+    const mstmm_complex t159 = mstmm_complex_times(gain[17], t140);
+    const mstmm_complex t160 = mstmm_complex_plus(t158, t159);
+    const mstmm_complex t161 = mstmm_complex_minus(y[1], t160);
+    x[1] = t161;
+    const mstmm_complex t162 = mstmm_complex_times(B[0], t143);
+    const mstmm_complex t163 = mstmm_complex_times(B[9], t161);
+    const mstmm_complex t164 = mstmm_complex_plus(t162, t163);
+    const mstmm_complex t165 = mstmm_complex_plus(t4, t164);
+    z[0] = t165;
+    const mstmm_complex t166 = mstmm_complex_times(B[1], t143);
+    const mstmm_complex t167 = mstmm_complex_times(B[10], t161);
+    const mstmm_complex t168 = mstmm_complex_plus(t166, t167);
+    const mstmm_complex t169 = mstmm_complex_plus(t10, t168);
+    z[1] = t169;
+    const mstmm_complex t170 = mstmm_complex_times(B[2], t143);
+    const mstmm_complex t171 = mstmm_complex_times(B[11], t161);
+    const mstmm_complex t172 = mstmm_complex_plus(t170, t171);
+    const mstmm_complex t173 = mstmm_complex_plus(t17, t172);
+    z[2] = t173;
+    const mstmm_complex t174 = mstmm_complex_times(B[3], t143);
+    const mstmm_complex t175 = mstmm_complex_times(B[12], t161);
+    const mstmm_complex t176 = mstmm_complex_plus(t174, t175);
+    const mstmm_complex t177 = mstmm_complex_plus(t28, t176);
+    z[3] = t177;
+    const mstmm_complex t178 = mstmm_complex_times(B[4], t143);
+    const mstmm_complex t179 = mstmm_complex_times(B[13], t161);
+    const mstmm_complex t180 = mstmm_complex_plus(t178, t179);
+    const mstmm_complex t181 = mstmm_complex_plus(t39, t180);
+    z[4] = t181;
+    const mstmm_complex t182 = mstmm_complex_times(B[5], t143);
+    const mstmm_complex t183 = mstmm_complex_times(B[14], t161);
+    const mstmm_complex t184 = mstmm_complex_plus(t182, t183);
+    const mstmm_complex t185 = mstmm_complex_plus(t50, t184);
+    z[5] = t185;
+    const mstmm_complex t186 = mstmm_complex_times(B[6], t143);
+    const mstmm_complex t187 = mstmm_complex_times(B[15], t161);
+    const mstmm_complex t188 = mstmm_complex_plus(t186, t187);
+    const mstmm_complex t189 = mstmm_complex_plus(t117, t188);
+    z[6] = t189;
+    const mstmm_complex t190 = mstmm_complex_times(B[7], t143);
+    const mstmm_complex t191 = mstmm_complex_times(B[16], t161);
+    const mstmm_complex t192 = mstmm_complex_plus(t190, t191);
+    const mstmm_complex t193 = mstmm_complex_plus(t129, t192);
+    z[7] = t193;
+    const mstmm_complex t194 = mstmm_complex_times(B[8], t143);
+    const mstmm_complex t195 = mstmm_complex_times(B[17], t161);
+    const mstmm_complex t196 = mstmm_complex_plus(t194, t195);
+    const mstmm_complex t197 = mstmm_complex_plus(t140, t196);
+    z[8] = t197;
+    return 0;
+}
+
+/* solution of a hinge with 3 free speeds for a right-hand side
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  w_I[3] (rad/s) angular velocity of the parent, parent axes
+ * in  v[3] (m/s) relative velocity of the hinge, body axes
+ * in  w[3] (rad/s) relative angular velocity of the hinge, body axes
+ * in  z_I[9] change of the parent's motion, parent axes
+ * in  B[3][9] motion along the unknowns
+ * in  gain[3][9] D^-1 times the rows by the motion
+ * in  y[3] D^-1 times the remainder of the rows
+ * out x[3] unknowns
+ * out z[9] change of the body's motion, own axes
+ */
+static int mstmm_complex_sweep_generic3_tangent_solution(const double *restrict Rc, const double *restrict r,
+    const double *restrict w_I, const double *restrict v, const double *restrict w,
+    const mstmm_complex *restrict z_I, const mstmm_complex *restrict B, const mstmm_complex *restrict gain,
+    const mstmm_complex *restrict y, mstmm_complex *restrict x, mstmm_complex *restrict z)
+{
+    const mstmm_complex t0 = mstmm_complex_scaled(Rc[0], z_I[0]);
+    const mstmm_complex t1 = mstmm_complex_scaled(Rc[3], z_I[1]);
+    const mstmm_complex t2 = mstmm_complex_plus(t0, t1);
+    const mstmm_complex t3 = mstmm_complex_scaled(Rc[6], z_I[2]);
+    const mstmm_complex t4 = mstmm_complex_plus(t2, t3);
+    const mstmm_complex t5 = mstmm_complex_times(gain[0], t4);
+    const mstmm_complex t6 = mstmm_complex_scaled(Rc[1], z_I[0]);
+    const mstmm_complex t7 = mstmm_complex_scaled(Rc[4], z_I[1]);
+    const mstmm_complex t8 = mstmm_complex_plus(t6, t7);
+    const mstmm_complex t9 = mstmm_complex_scaled(Rc[7], z_I[2]);
+    const mstmm_complex t10 = mstmm_complex_plus(t8, t9);
+    const mstmm_complex t11 = mstmm_complex_times(gain[1], t10);
+    const mstmm_complex t12 = mstmm_complex_plus(t5, t11);
+    const mstmm_complex t13 = mstmm_complex_scaled(Rc[2], z_I[0]);
+    const mstmm_complex t14 = mstmm_complex_scaled(Rc[5], z_I[1]);
+    const mstmm_complex t15 = mstmm_complex_plus(t13, t14);
+    const mstmm_complex t16 = mstmm_complex_scaled(Rc[8], z_I[2]);
+    const mstmm_complex t17 = mstmm_complex_plus(t15, t16);
+    const mstmm_complex t18 = mstmm_complex_times(gain[2], t17);
+    const mstmm_complex t19 = mstmm_complex_plus(t12, t18);
+    const mstmm_complex t20 = mstmm_complex_scaled(w[2], t10);
+    const mstmm_complex t21 = mstmm_complex_scaled(w[1], t17);
+    const mstmm_complex t22 = mstmm_complex_minus(t20, t21);
+    const mstmm_complex t23 = mstmm_complex_scaled(Rc[0], z_I[3]);
+    const mstmm_complex t24 = mstmm_complex_scaled(Rc[3], z_I[4]);
+    const mstmm_complex t25 = mstmm_complex_plus(t23, t24);
+    const mstmm_complex t26 = mstmm_complex_scaled(Rc[6], z_I[5]);
+    const mstmm_complex t27 = mstmm_complex_plus(t25, t26);
+    const mstmm_complex t28 = mstmm_complex_plus(t22, t27);
+    const mstmm_complex t29 = mstmm_complex_times(gain[3], t28);
+    const mstmm_complex t30 = mstmm_complex_plus(t19, t29);
+    const mstmm_complex t31 = mstmm_complex_scaled(w[0], t17);
+    const mstmm_complex t32 = mstmm_complex_scaled(w[2], t4);
+    const mstmm_complex t33 = mstmm_complex_minus(t31, t32);
+    const mstmm_complex t34 = mstmm_complex_scaled(Rc[1], z_I[3]);
+    const mstmm_complex t35 = mstmm_complex_scaled(Rc[4], z_I[4]);
+    const mstmm_complex t36 = mstmm_complex_plus(t34, t35);
+    const mstmm_complex t37 = mstmm_complex_scaled(Rc[7], z_I[5]);
+    const mstmm_complex t38 = mstmm_complex_plus(t36, t37);
+    const mstmm_complex t39 = mstmm_complex_plus(t33, t38);
+    const mstmm_complex t40 = mstmm_complex_times(gain[4], t39);
+    const mstmm_complex t41 = mstmm_complex_plus(t30, t40);
+    const mstmm_complex t42 = mstmm_complex_scaled(w[1], t4);
+    const mstmm_complex t43 = mstmm_complex_scaled(w[0], t10);
+    const mstmm_complex t44 = mstmm_complex_minus(t42, t43);
+    const mstmm_complex t45 = mstmm_complex_scaled(Rc[2], z_I[3]);
+    const mstmm_complex t46 = mstmm_complex_scaled(Rc[5], z_I[4]);
+    const mstmm_complex t47 = mstmm_complex_plus(t45, t46);
+    const mstmm_complex t48 = mstmm_complex_scaled(Rc[8], z_I[5]);
+    const mstmm_complex t49 = mstmm_complex_plus(t47, t48);
+    const mstmm_complex t50 = mstmm_complex_plus(t44, t49);
+    const mstmm_complex t51 = mstmm_complex_times(gain[5], t50);
+    const mstmm_complex t52 = mstmm_complex_plus(t41, t51);
+    const double t53 = v[2] * 2.0;
+    const mstmm_complex t54 = mstmm_complex_scaled(t53, t10);
+    const double t55 = v[1] * 2.0;
+    const mstmm_complex t56 = mstmm_complex_scaled(t55, t17);
+    const mstmm_complex t57 = mstmm_complex_minus(t54, t56);
+    const mstmm_complex t58 = mstmm_complex_scaled(r[2], z_I[4]);
+    const double t59 = r[1] * w_I[1];
+    const double t60 = r[2] * w_I[2];
+    const double t61 = t59 + t60;
+    const mstmm_complex t62 = mstmm_complex_scaled(t61, z_I[0]);
+    const double t63 = r[0] * w_I[1];
+    const double t64 = 2.0 * t63;
+    const double t65 = r[1] * w_I[0];
+    const double t66 = t64 - t65;
+    const mstmm_complex t67 = mstmm_complex_scaled(t66, z_I[1]);
+    const double t68 = r[0] * w_I[2];
+    const double t69 = 2.0 * t68;
+    const double t70 = r[2] * w_I[0];
+    const double t71 = t69 - t70;
+    const mstmm_complex t72 = mstmm_complex_scaled(t71, z_I[2]);
+    const mstmm_complex t73 = mstmm_complex_plus(t67, t72);
+    const mstmm_complex t74 = mstmm_complex_minus(t62, t73);
+    const mstmm_complex t75 = mstmm_complex_scaled(r[1], z_I[5]);
+    const mstmm_complex t76 = mstmm_complex_minus(t74, t75);
+    const mstmm_complex t77 = mstmm_complex_plus(t58, t76);
+    const mstmm_complex t78 = mstmm_complex_plus(z_I[6], t77);
+    const mstmm_complex t79 = mstmm_complex_scaled(Rc[0], t78);
+    const mstmm_complex t80 = mstmm_complex_scaled(r[0], z_I[5]);
+    const double t81 = r[0] * w_I[0];
+    const double t82 = t60 + t81;
+    const mstmm_complex t83 = mstmm_complex_scaled(t82, z_I[1]);
+    const double t84 = 2.0 * t65;
+    const double t85 = t84 - t63;
+    const mstmm_complex t86 = mstmm_complex_scaled(t85, z_I[0]);
+    const mstmm_complex t87 = mstmm_complex_minus(t83, t86);
+    const double t88 = r[1] * w_I[2];
+    const double t89 = 2.0 * t88;
+    const double t90 = r[2] * w_I[1];
+    const double t91 = t89 - t90;
+    const mstmm_complex t92 = mstmm_complex_scaled(t91, z_I[2]);
+    const mstmm_complex t93 = mstmm_complex_minus(t87, t92);
+    const mstmm_complex t94 = mstmm_complex_plus(t80, t93);
+    const mstmm_complex t95 = mstmm_complex_scaled(r[2], z_I[3]);
+    const mstmm_complex t96 = mstmm_complex_minus(t94, t95);
+    const mstmm_complex t97 = mstmm_complex_plus(z_I[7], t96);
+    const mstmm_complex t98 = mstmm_complex_scaled(Rc[3], t97);
+    const mstmm_complex t99 = mstmm_complex_plus(t79, t98);
+    const mstmm_complex t100 = mstmm_complex_scaled(r[1], z_I[3]);
+    const double t101 = t59 + t81;
+    const mstmm_complex t102 = mstmm_complex_scaled(t101, z_I[2]);
+    const double t103 = 2.0 * t70;
+    const double t104 = t103 - t68;
+    const mstmm_complex t105 = mstmm_complex_scaled(t104, z_I[0]);
+    const mstmm_complex t106 = mstmm_complex_minus(t102, t105);
+    const double t107 = 2.0 * t90;
+    const double t108 = t107 - t88;
+    const mstmm_complex t109 = mstmm_complex_scaled(t108, z_I[1]);
+    const mstmm_complex t110 = mstmm_complex_minus(t106, t109);
+    const mstmm_complex t111 = mstmm_complex_scaled(r[0], z_I[4]);
+    const mstmm_complex t112 = mstmm_complex_minus(t110, t111);
+    const mstmm_complex t113 = mstmm_complex_plus(t100, t112);
+    const mstmm_complex t114 = mstmm_complex_plus(z_I[8], t113);
+    const mstmm_complex t115 = mstmm_complex_scaled(Rc[6], t114);
+    const mstmm_complex t116 = mstmm_complex_plus(t99, t115);
+    const mstmm_complex t117 = mstmm_complex_plus(t57, t116);
+    const mstmm_complex t118 = mstmm_complex_times(gain[6], t117);
+    const mstmm_complex t119 = mstmm_complex_plus(t52, t118);
+    const double t120 = v[0] * 2.0;
+    const mstmm_complex t121 = mstmm_complex_scaled(t120, t17);
+    const mstmm_complex t122 = mstmm_complex_scaled(t53, t4);
+    const mstmm_complex t123 = mstmm_complex_minus(t121, t122);
+    const mstmm_complex t124 = mstmm_complex_scaled(Rc[1], t78);
+    const mstmm_complex t125 = mstmm_complex_scaled(Rc[4], t97);
+    const mstmm_complex t126 = mstmm_complex_plus(t124, t125);
+    const mstmm_complex t127 = mstmm_complex_scaled(Rc[7], t114);
+    const mstmm_complex t128 = mstmm_complex_plus(t126, t127);
+    const mstmm_complex t129 = mstmm_complex_plus(t123, t128);
+    const mstmm_complex t130 = mstmm_complex_times(gain[7], t129);
+    const mstmm_complex t131 = mstmm_complex_plus(t119, t130);
+    const mstmm_complex t132 = mstmm_complex_scaled(t55, t4);
+    const mstmm_complex t133 = mstmm_complex_scaled(t120, t10);
+    const mstmm_complex t134 = mstmm_complex_minus(t132, t133);
+    const mstmm_complex t135 = mstmm_complex_scaled(Rc[2], t78);
+    const mstmm_complex t136 = mstmm_complex_scaled(Rc[5], t97);
+    const mstmm_complex t137 = mstmm_complex_plus(t135, t136);
+    const mstmm_complex t138 = mstmm_complex_scaled(Rc[8], t114);
+    const mstmm_complex t139 = mstmm_complex_plus(t137, t138);
+    const mstmm_complex t140 = mstmm_complex_plus(t134, t139);
+    const mstmm_complex t141 = mstmm_complex_times(gain[8], t140);
+    const mstmm_complex t142 = mstmm_complex_plus(t131, t141);
+    const mstmm_complex t143 = mstmm_complex_minus(y[0], t142);
+    x[0] = t143;
+    const mstmm_complex t144 = mstmm_complex_times(gain[9], t4);
+    const mstmm_complex t145 = mstmm_complex_times(gain[10], t10);
+    const mstmm_complex t146 = mstmm_complex_plus(t144, t145);
+    const mstmm_complex t147 = mstmm_complex_times(gain[11], t17);
+    const mstmm_complex t148 = mstmm_complex_plus(t146, t147);
+    const mstmm_complex t149 = mstmm_complex_times(gain[12], t28);
+    const mstmm_complex t150 = mstmm_complex_plus(t148, t149);
+    const mstmm_complex t151 = mstmm_complex_times(gain[13], t39);
+    const mstmm_complex t152 = mstmm_complex_plus(t150, t151);
+    const mstmm_complex t153 = mstmm_complex_times(gain[14], t50);
+    const mstmm_complex t154 = mstmm_complex_plus(t152, t153);
+    const mstmm_complex t155 = mstmm_complex_times(gain[15], t117);
+    const mstmm_complex t156 = mstmm_complex_plus(t154, t155);
+    const mstmm_complex t157 = mstmm_complex_times(gain[16], t129);
+    const mstmm_complex t158 = mstmm_complex_plus(t156, t157);
+    const mstmm_complex t159 = mstmm_complex_times(gain[17], t140);
+    const mstmm_complex t160 = mstmm_complex_plus(t158, t159);
+    const mstmm_complex t161 = mstmm_complex_minus(y[1], t160);
+    x[1] = t161;
+    const mstmm_complex t162 = mstmm_complex_times(gain[18], t4);
+    const mstmm_complex t163 = mstmm_complex_times(gain[19], t10);
+    const mstmm_complex t164 = mstmm_complex_plus(t162, t163);
+    const mstmm_complex t165 = mstmm_complex_times(gain[20], t17);
+    const mstmm_complex t166 = mstmm_complex_plus(t164, t165);
+    const mstmm_complex t167 = mstmm_complex_times(gain[21], t28);
+    const mstmm_complex t168 = mstmm_complex_plus(t166, t167);
+    const mstmm_complex t169 = mstmm_complex_times(gain[22], t39);
+    const mstmm_complex t170 = mstmm_complex_plus(t168, t169);
+    const mstmm_complex t171 = mstmm_complex_times(gain[23], t50);
+    const mstmm_complex t172 = mstmm_complex_plus(t170, t171);
+    const mstmm_complex t173 = mstmm_complex_times(gain[24], t117);
+    const mstmm_complex t174 = mstmm_complex_plus(t172, t173);
+    const mstmm_complex t175 = mstmm_complex_times(gain[25], t129);
+    const mstmm_complex t176 = mstmm_complex_plus(t174, t175);
+    const mstmm_complex t177 = mstmm_complex_times(gain[26], t140);
+    const mstmm_complex t178 = mstmm_complex_plus(t176, t177);
+    const mstmm_complex t179 = mstmm_complex_minus(y[2], t178);
+    x[2] = t179;
+    const mstmm_complex t180 = mstmm_complex_times(B[0], t143);
+    const mstmm_complex t181 = mstmm_complex_times(B[9], t161);
+    const mstmm_complex t182 = mstmm_complex_plus(t180, t181);
+    const mstmm_complex t183 = mstmm_complex_times(B[18], t179);
+    const mstmm_complex t184 = mstmm_complex_plus(t182, t183);
+    const mstmm_complex t185 = mstmm_complex_plus(t4, t184);
+    z[0] = t185;
+    const mstmm_complex t186 = mstmm_complex_times(B[1], t143);
+    const mstmm_complex t187 = mstmm_complex_times(B[10], t161);
+    const mstmm_complex t188 = mstmm_complex_plus(t186, t187);
+    const mstmm_complex t189 = mstmm_complex_times(B[19], t179);
+    const mstmm_complex t190 = mstmm_complex_plus(t188, t189);
+    const mstmm_complex t191 = mstmm_complex_plus(t10, t190);
+    z[1] = t191;
+    const mstmm_complex t192 = mstmm_complex_times(B[2], t143);
+    const mstmm_complex t193 = mstmm_complex_times(B[11], t161);
+    const mstmm_complex t194 = mstmm_complex_plus(t192, t193);
+    const mstmm_complex t195 = mstmm_complex_times(B[20], t179);
+    const mstmm_complex t196 = mstmm_complex_plus(t194, t195);
+    const mstmm_complex t197 = mstmm_complex_plus(t17, t196);
+    z[2] = t197;
+    const mstmm_complex t198 = mstmm_complex_times(B[3], t143);
+    const mstmm_complex t199 = mstmm_complex_times(B[12], t161);
+    const mstmm_complex t200 = mstmm_complex_plus(t198, t199);
+    const mstmm_complex t201 = mstmm_complex_times(B[21], t179);
+    const mstmm_complex t202 = mstmm_complex_plus(t200, t201);
+    const mstmm_complex t203 = mstmm_complex_plus(t28, t202);
+    z[3] = t203;
+    const mstmm_complex t204 = mstmm_complex_times(B[4], t143);
+    const mstmm_complex t205 = mstmm_complex_times(B[13], t161);
+    const mstmm_complex t206 = mstmm_complex_plus(t204, t205);
+    const mstmm_complex t207 = mstmm_complex_times(B[22], t179);
+    const mstmm_complex t208 = mstmm_complex_plus(t206, t207);
+    const mstmm_complex t209 = mstmm_complex_plus(t39, t208);
+    z[4] = t209;
+    const mstmm_complex t210 = mstmm_complex_times(B[5], t143);
+    const mstmm_complex t211 = mstmm_complex_times(B[14], t161);
+    const mstmm_complex t212 = mstmm_complex_plus(t210, t211);
+    const mstmm_complex t213 = mstmm_complex_times(B[23], t179);
+    const mstmm_complex t214 = mstmm_complex_plus(t212, t213);
+    const mstmm_complex t215 = mstmm_complex_plus(t50, t214);
+    z[5] = t215;
+    const mstmm_complex t216 = mstmm_complex_times(B[6], t143);
+    const mstmm_complex t217 = mstmm_complex_times(B[15], t161);
+    const mstmm_complex t218 = mstmm_complex_plus(t216, t217);
+    const mstmm_complex t219 = mstmm_complex_times(B[24], t179);
+    const mstmm_complex t220 = mstmm_complex_plus(t218, t219);
+    const mstmm_complex t221 = mstmm_complex_plus(t117, t220);
+    z[6] = t221;
+    const mstmm_complex t222 = mstmm_complex_times(B[7], t143);
+    const mstmm_complex t223 = mstmm_complex_times(B[16], t161);
+    const mstmm_complex t224 = mstmm_complex_plus(t222, t223);
+    const mstmm_complex t225 = mstmm_complex_times(B[25], t179);
+    const mstmm_complex t226 = mstmm_complex_plus(t224, t225);
+    const mstmm_complex t227 = mstmm_complex_plus(t129, t226);
+    z[7] = t227;
+    const mstmm_complex t228 = mstmm_complex_times(B[8], t143);
+    const mstmm_complex t229 = mstmm_complex_times(B[17], t161);
+    const mstmm_complex t230 = mstmm_complex_plus(t228, t229);
+    const mstmm_complex t231 = mstmm_complex_times(B[26], t179);
+    const mstmm_complex t232 = mstmm_complex_plus(t230, t231);
+    const mstmm_complex t233 = mstmm_complex_plus(t140, t232);
+    z[8] = t233;
+    return 0;
+}
+
+/* solution of a hinge with 4 free speeds for a right-hand side
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  w_I[3] (rad/s) angular velocity of the parent, parent axes
+ * in  v[3] (m/s) relative velocity of the hinge, body axes
+ * in  w[3] (rad/s) relative angular velocity of the hinge, body axes
+ * in  z_I[9] change of the parent's motion, parent axes
+ * in  B[4][9] motion along the unknowns
+ * in  gain[4][9] D^-1 times the rows by the motion
+ * in  y[4] D^-1 times the remainder of the rows
+ * out x[4] unknowns
+ * out z[9] change of the body's motion, own axes
+ */
+static int mstmm_complex_sweep_generic4_tangent_solution(const double *restrict Rc, const double *restrict r,
+    const double *restrict w_I, const double *restrict v, const double *restrict w,
+    const mstmm_complex *restrict z_I, const mstmm_complex *restrict B, const mstmm_complex *restrict gain,
+    const mstmm_complex *restrict y, mstmm_complex *restrict x, mstmm_complex *restrict z)
+{
+    const mstmm_complex t0 = mstmm_complex_scaled(Rc[0], z_I[0]);
+    const mstmm_complex t1 = mstmm_complex_scaled(Rc[3], z_I[1]);
+    const mstmm_complex t2 = mstmm_complex_plus(t0, t1);
+    const mstmm_complex t3 = mstmm_complex_scaled(Rc[6], z_I[2]);
+    const mstmm_complex t4 = mstmm_complex_plus(t2, t3);
+    const mstmm_complex t5 = mstmm_complex_times(gain[0], t4);
+    const mstmm_complex t6 = mstmm_complex_scaled(Rc[1], z_I[0]);
+    const mstmm_complex t7 = mstmm_complex_scaled(Rc[4], z_I[1]);
+    const mstmm_complex t8 = mstmm_complex_plus(t6, t7);
+    const mstmm_complex t9 = mstmm_complex_scaled(Rc[7], z_I[2]);
+    const mstmm_complex t10 = mstmm_complex_plus(t8, t9);
+    const mstmm_complex t11 = mstmm_complex_times(gain[1], t10);
+    const mstmm_complex t12 = mstmm_complex_plus(t5, t11);
+    const mstmm_complex t13 = mstmm_complex_scaled(Rc[2], z_I[0]);
+    const mstmm_complex t14 = mstmm_complex_scaled(Rc[5], z_I[1]);
+    const mstmm_complex t15 = mstmm_complex_plus(t13, t14);
+    const mstmm_complex t16 = mstmm_complex_scaled(Rc[8], z_I[2]);
+    const mstmm_complex t17 = mstmm_complex_plus(t15, t16);
+    const mstmm_complex t18 = mstmm_complex_times(gain[2], t17);
+    const mstmm_complex t19 = mstmm_complex_plus(t12, t18);
+    const mstmm_complex t20 = mstmm_complex_scaled(w[2], t10);
+    const mstmm_complex t21 = mstmm_complex_scaled(w[1], t17);
+    const mstmm_complex t22 = mstmm_complex_minus(t20, t21);
+    const mstmm_complex t23 = mstmm_complex_scaled(Rc[0], z_I[3]);
+    const mstmm_complex t24 = mstmm_complex_scaled(Rc[3], z_I[4]);
+    const mstmm_complex t25 = mstmm_complex_plus(t23, t24);
+    const mstmm_complex t26 = mstmm_complex_scaled(Rc[6], z_I[5]);
+    const mstmm_complex t27 = mstmm_complex_plus(t25, t26);
+    const mstmm_complex t28 = mstmm_complex_plus(t22, t27);
+    const mstmm_complex t29 = mstmm_complex_times(gain[3], t28);
+    const mstmm_complex t30 = mstmm_complex_plus(t19, t29);
+    const mstmm_complex t31 = mstmm_complex_scaled(w[0], t17);
+    const mstmm_complex t32 = mstmm_complex_scaled(w[2], t4);
+    const mstmm_complex t33 = mstmm_complex_minus(t31, t32);
+    const mstmm_complex t34 = mstmm_complex_scaled(Rc[1], z_I[3]);
+    const mstmm_complex t35 = mstmm_complex_scaled(Rc[4], z_I[4]);
+    const mstmm_complex t36 = mstmm_complex_plus(t34, t35);
+    const mstmm_complex t37 = mstmm_complex_scaled(Rc[7], z_I[5]);
+    const mstmm_complex t38 = mstmm_complex_plus(t36, t37);
+    const mstmm_complex t39 = mstmm_complex_plus(t33, t38);
+    const mstmm_complex t40 = mstmm_complex_times(gain[4], t39);
+    const mstmm_complex t41 = mstmm_complex_plus(t30, t40);
+    const mstmm_complex t42 = mstmm_complex_scaled(w[1], t4);
+    const mstmm_complex t43 = mstmm_complex_scaled(w[0], t10);
+    const mstmm_complex t44 = mstmm_complex_minus(t42, t43);
+    const mstmm_complex t45 = mstmm_complex_scaled(Rc[2], z_I[3]);
+    const mstmm_complex t46 = mstmm_complex_scaled(Rc[5], z_I[4]);
+    const mstmm_complex t47 = mstmm_complex_plus(t45, t46);
+    const mstmm_complex t48 = mstmm_complex_scaled(Rc[8], z_I[5]);
+    const mstmm_complex t49 = mstmm_complex_plus(t47, t48);
+    const mstmm_complex t50 = mstmm_complex_plus(t44, t49);
+    const mstmm_complex t51 = mstmm_complex_times(gain[5], t50);
+    const mstmm_complex t52 = mstmm_complex_plus(t41, t51);
+    const double t53 = v[2] * 2.0;
+    const mstmm_complex t54 = mstmm_complex_scaled(t53, t10);
+    const double t55 = v[1] * 2.0;
+    const mstmm_complex t56 = mstmm_complex_scaled(t55, t17);
+    const mstmm_complex t57 = mstmm_complex_minus(t54, t56);
+    const mstmm_complex t58 = mstmm_complex_scaled(r[2], z_I[4]);
+    const double t59 = r[1] * w_I[1];
+    const double t60 = r[2] * w_I[2];
+    const double t61 = t59 + t60;
+    const mstmm_complex t62 = mstmm_complex_scaled(t61, z_I[0]);
+    const double t63 = r[0] * w_I[1];
+    const double t64 = 2.0 * t63;
+    const double t65 = r[1] * w_I[0];
+    const double t66 = t64 - t65;
+    const mstmm_complex t67 = mstmm_complex_scaled(t66, z_I[1]);
+    const double t68 = r[0] * w_I[2];
+    const double t69 = 2.0 * t68;
+    const double t70 = r[2] * w_I[0];
+    const double t71 = t69 - t70;
+    const mstmm_complex t72 = mstmm_complex_scaled(t71, z_I[2]);
+    const mstmm_complex t73 = mstmm_complex_plus(t67, t72);
+    const mstmm_complex t74 = mstmm_complex_minus(t62, t73);
+    const mstmm_complex t75 = mstmm_complex_scaled(r[1], z_I[5]);
+    const mstmm_complex t76 = mstmm_complex_minus(t74, t75);
+    const mstmm_complex t77 = mstmm_complex_plus(t58, t76);
+    const mstmm_complex t78 = mstmm_complex_plus(z_I[6], t77);
+    const mstmm_complex t79 = mstmm_complex_scaled(Rc[0], t78);
+    const mstmm_complex t80 = mstmm_complex_scaled(r[0], z_I[5]);
+    const double t81 = r[0] * w_I[0];
+    const double t82 = t60 + t81;
+    const mstmm_complex t83 = mstmm_complex_scaled(t82, z_I[1]);
+    const double t84 = 2.0 * t65;
+    const double t85 = t84 - t63;
+    const mstmm_complex t86 = mstmm_complex_scaled(t85, z_I[0]);
+    const mstmm_complex t87 = mstmm_complex_minus(t83, t86);
+    const double t88 = r[1] * w_I[2];
+    const double t89 = 2.0 * t88;
+    const double t90 = r[2] * w_I[1];
+    const double t91 = t89 - t90;
+    const mstmm_complex t92 = mstmm_complex_scaled(t91, z_I[2]);
+    const mstmm_complex t93 = mstmm_complex_minus(t87, t92);
+    const mstmm_complex t94 = mstmm_complex_plus(t80, t93);
+    const mstmm_complex t95 = mstmm_complex_scaled(r[2], z_I[3]);
+    const mstmm_complex t96 = mstmm_complex_minus(t94, t95);
+    const mstmm_complex t97 = mstmm_complex_plus(z_I[7], t96);
+    const mstmm_complex t98 = mstmm_complex_scaled(Rc[3], t97);
+    const mstmm_complex t99 = mstmm_complex_plus(t79, t98);
+    const mstmm_complex t100 = mstmm_complex_scaled(r[1], z_I[3]);
+    const double t101 = t59 + t81;
+    const mstmm_complex t102 = mstmm_complex_scaled(t101, z_I[2]);
+    const double t103 = 2.0 * t70;
+    const double t104 = t103 - t68;
+    const mstmm_complex t105 = mstmm_complex_scaled(t104, z_I[0]);
+    const mstmm_complex t106 = mstmm_complex_minus(t102, t105);
+    const double t107 = 2.0 * t90;
+    const double t108 = t107 - t88;
+    const mstmm_complex t109 = mstmm_complex_scaled(t108, z_I[1]);
+    const mstmm_complex t110 = mstmm_complex_minus(t106, t109);
+    const mstmm_complex t111 = mstmm_complex_scaled(r[0], z_I[4]);
+    const mstmm_complex t112 = mstmm_complex_minus(t110, t111);
+    const mstmm_complex t113 = mstmm_complex_plus(t100, t112);
+    const mstmm_complex t114 = mstmm_complex_plus(z_I[8], t113);
+    const mstmm_complex t115 = mstmm_complex_scaled(Rc[6], t114);
+    const mstmm_complex t116 = mstmm_complex_plus(t99, t115);
+    const mstmm_complex t117 = mstmm_complex_plus(t57, t116);
+    const mstmm_complex t118 = mstmm_complex_times(gain[6], t117);
+    const mstmm_complex t119 = mstmm_complex_plus(t52, t118);
+    const double t120 = v[0] * 2.0;
+    const mstmm_complex t121 = mstmm_complex_scaled(t120, t17);
+    const mstmm_complex t122 = mstmm_complex_scaled(t53, t4);
+    const mstmm_complex t123 = mstmm_complex_minus(t121, t122);
+    const mstmm_complex t124 = mstmm_complex_scaled(Rc[1], t78);
+    const mstmm_complex t125 = mstmm_complex_scaled(Rc[4], t97);
+    const mstmm_complex t126 = mstmm_complex_plus(t124, t125);
+    const mstmm_complex t127 = mstmm_complex_scaled(Rc[7], t114);
+    const mstmm_complex t128 = mstmm_complex_plus(t126, t127);
+    const mstmm_complex t129 = mstmm_complex_plus(t123, t128);
+    const mstmm_complex t130 = mstmm_complex_times(gain[7], t129);
+    const mstmm_complex t131 = mstmm_complex_plus(t119, t130);
+    const mstmm_complex t132 = mstmm_complex_scaled(t55, t4);
+    const mstmm_complex t133 = mstmm_complex_scaled(t120, t10);
+    const mstmm_complex t134 = mstmm_complex_minus(t132, t133);
+    const mstmm_complex t135 = mstmm_complex_scaled(Rc[2], t78);
+    const mstmm_complex t136 = mstmm_complex_scaled(Rc[5], t97);
+    const mstmm_complex t137 = mstmm_complex_plus(t135, t136);
+    const mstmm_complex t138 = mstmm_complex_scaled(Rc[8], t114);
+    const mstmm_complex t139 = mstmm_complex_plus(t137, t138);
+    const mstmm_complex t140 = mstmm_complex_plus(t134, t139);
+    const mstmm_complex t141 = mstmm_complex_times(gain[8], t140);
+    const mstmm_complex t142 = mstmm_complex_plus(t131, t141);
+    const mstmm_complex t143 = mstmm_complex_minus(y[0], t142);
+    x[0] = t143;
+    const mstmm_complex t144 = mstmm_complex_times(gain[9], t4);
+    const mstmm_complex t145 = mstmm_complex_times(gain[10], t10);
+    const mstmm_complex t146 = mstmm_complex_plus(t144, t145);
+    const mstmm_complex t147 = mstmm_complex_times(gain[11], t17);
+    const mstmm_complex t148 = mstmm_complex_plus(t146, t147);
+    const mstmm_complex t149 = mstmm_complex_times(gain[12], t28);
+    const mstmm_complex t150 = mstmm_complex_plus(t148, t149);
+    const mstmm_complex t151 = mstmm_complex_times(gain[13], t39);
+    const mstmm_complex t152 = mstmm_complex_plus(t150, t151);
+    const mstmm_complex t153 = mstmm_complex_times(gain[14], t50);
+    const mstmm_complex t154 = mstmm_complex_plus(t152, t153);
+    const mstmm_complex t155 = mstmm_complex_times(gain[15], t117);
+    const mstmm_complex t156 = mstmm_complex_plus(t154, t155);
+    const mstmm_complex t157 = mstmm_complex_times(gain[16], t129);
+    const mstmm_complex t158 = mstmm_complex_plus(t156, t157);
+    const mstmm_complex t159 = mstmm_complex_times(gain[17], t140);
+    const mstmm_complex t160 = mstmm_complex_plus(t158, t159);
+    const mstmm_complex t161 = mstmm_complex_minus(y[1], t160);
+    x[1] = t161;
+    const mstmm_complex t162 = mstmm_complex_times(gain[18], t4);
+    const mstmm_complex t163 = mstmm_complex_times(gain[19], t10);
+    const mstmm_complex t164 = mstmm_complex_plus(t162, t163);
+    const mstmm_complex t165 = mstmm_complex_times(gain[20], t17);
+    const mstmm_complex t166 = mstmm_complex_plus(t164, t165);
+    const mstmm_complex t167 = mstmm_complex_times(gain[21], t28);
+    const mstmm_complex t168 = mstmm_complex_plus(t166, t167);
+    const mstmm_complex t169 = mstmm_complex_times(gain[22], t39);
+    const mstmm_complex t170 = mstmm_complex_plus(t168, t169);
+    const mstmm_complex t171 = mstmm_complex_times(gain[23], t50);
+    const mstmm_complex t172 = mstmm_complex_plus(t170, t171);
+    const mstmm_complex t173 = mstmm_complex_times(gain[24], t117);
+    const mstmm_complex t174 = mstmm_complex_plus(t172, t173);
+    const mstmm_complex t175 = mstmm_complex_times(gain[25], t129);
+    const mstmm_complex t176 = mstmm_complex_plus(t174, t175);
+    const mstmm_complex t177 = mstmm_complex_times(gain[26], t140);
+    const mstmm_complex t178 = mstmm_complex_plus(t176, t177);
+    const mstmm_complex t179 = mstmm_complex_minus(y[2], t178);
+    x[2] = t179;
+    const mstmm_complex t180 = mstmm_complex_times(gain[27], t4);
+    const mstmm_complex t181 = mstmm_complex_times(gain[28], t10);
+    const mstmm_complex t182 = mstmm_complex_plus(t180, t181);
+    const mstmm_complex t183 = mstmm_complex_times(gain[29], t17);
+    const mstmm_complex t184 = mstmm_complex_plus(t182, t183);
+    const mstmm_complex t185 = mstmm_complex_times(gain[30], t28);
+    const mstmm_complex t186 = mstmm_complex_plus(t184, t185);
+    const mstmm_complex t187 = mstmm_complex_times(gain[31], t39);
+    const mstmm_complex t188 = mstmm_complex_plus(t186, t187);
+    const mstmm_complex t189 = mstmm_complex_times(gain[32], t50);
+    const mstmm_complex t190 = mstmm_complex_plus(t188, t189);
+    const mstmm_complex t191 = mstmm_complex_times(gain[33], t117);
+    const mstmm_complex t192 = mstmm_complex_plus(t190, t191);
+    const mstmm_complex t193 = mstmm_complex_times(gain[34], t129);
+    const mstmm_complex t194 = mstmm_complex_plus(t192, t193);
+    const mstmm_complex t195 = mstmm_complex_times(gain[35], t140);
+    const mstmm_complex t196 = mstmm_complex_plus(t194, t195);
+    const mstmm_complex t197 = mstmm_complex_minus(y[3], t196);
+    x[3] = t197;
+    const mstmm_complex t198 = mstmm_complex_times(B[0], t143);
+    const mstmm_complex t199 = mstmm_complex_times(B[9], t161);
+    const mstmm_complex t200 = mstmm_complex_plus(t198, t199);
+    const mstmm_complex t201 = mstmm_complex_times(B[18], t179);
+    const mstmm_complex t202 = mstmm_complex_plus(t200, t201);
+    const mstmm_complex t203 = mstmm_complex_times(B[27], t197);
+    const mstmm_complex t204 = mstmm_complex_plus(t202, t203);
+    const mstmm_complex t205 = mstmm_complex_plus(t4, t204);
+    z[0] = t205;
+    const mstmm_complex t206 = mstmm_complex_times(B[1], t143);
+    const mstmm_complex t207 = mstmm_complex_times(B[10], t161);
+    const mstmm_complex t208 = mstmm_complex_plus(t206, t207);
+    const mstmm_complex t209 = mstmm_complex_times(B[19], t179);
+    const mstmm_complex t210 = mstmm_complex_plus(t208, t209);
+    const mstmm_complex t211 = mstmm_complex_times(B[28], t197);
+    const mstmm_complex t212 = mstmm_complex_plus(t210, t211);
+    const mstmm_complex t213 = mstmm_complex_plus(t10, t212);
+    z[1] = t213;
+    const mstmm_complex t214 = mstmm_complex_times(B[2], t143);
+    const mstmm_complex t215 = mstmm_complex_times(B[11], t161);
+    const mstmm_complex t216 = mstmm_complex_plus(t214, t215);
+    const mstmm_complex t217 = mstmm_complex_times(B[20], t179);
+    const mstmm_complex t218 = mstmm_complex_plus(t216, t217);
+    const mstmm_complex t219 = mstmm_complex_times(B[29], t197);
+    const mstmm_complex t220 = mstmm_complex_plus(t218, t219);
+    const mstmm_complex t221 = mstmm_complex_plus(t17, t220);
+    z[2] = t221;
+    const mstmm_complex t222 = mstmm_complex_times(B[3], t143);
+    const mstmm_complex t223 = mstmm_complex_times(B[12], t161);
+    const mstmm_complex t224 = mstmm_complex_plus(t222, t223);
+    const mstmm_complex t225 = mstmm_complex_times(B[21], t179);
+    const mstmm_complex t226 = mstmm_complex_plus(t224, t225);
+    const mstmm_complex t227 = mstmm_complex_times(B[30], t197);
+    const mstmm_complex t228 = mstmm_complex_plus(t226, t227);
+    const mstmm_complex t229 = mstmm_complex_plus(t28, t228);
+    z[3] = t229;
+    const mstmm_complex t230 = mstmm_complex_times(B[4], t143);
+    const mstmm_complex t231 = mstmm_complex_times(B[13], t161);
+    const mstmm_complex t232 = mstmm_complex_plus(t230, t231);
+    const mstmm_complex t233 = mstmm_complex_times(B[22], t179);
+    const mstmm_complex t234 = mstmm_complex_plus(t232, t233);
+    const mstmm_complex t235 = mstmm_complex_times(B[31], t197);
+    const mstmm_complex t236 = mstmm_complex_plus(t234, t235);
+    const mstmm_complex t237 = mstmm_complex_plus(t39, t236);
+    z[4] = t237;
+    const mstmm_complex t238 = mstmm_complex_times(B[5], t143);
+    const mstmm_complex t239 = mstmm_complex_times(B[14], t161);
+    const mstmm_complex t240 = mstmm_complex_plus(t238, t239);
+    const mstmm_complex t241 = mstmm_complex_times(B[23], t179);
+    const mstmm_complex t242 = mstmm_complex_plus(t240, t241);
+    const mstmm_complex t243 = mstmm_complex_times(B[32], t197);
+    const mstmm_complex t244 = mstmm_complex_plus(t242, t243);
+    const mstmm_complex t245 = mstmm_complex_plus(t50, t244);
+    z[5] = t245;
+    const mstmm_complex t246 = mstmm_complex_times(B[6], t143);
+    const mstmm_complex t247 = mstmm_complex_times(B[15], t161);
+    const mstmm_complex t248 = mstmm_complex_plus(t246, t247);
+    const mstmm_complex t249 = mstmm_complex_times(B[24], t179);
+    const mstmm_complex t250 = mstmm_complex_plus(t248, t249);
+    const mstmm_complex t251 = mstmm_complex_times(B[33], t197);
+    const mstmm_complex t252 = mstmm_complex_plus(t250, t251);
+    const mstmm_complex t253 = mstmm_complex_plus(t117, t252);
+    z[6] = t253;
+    const mstmm_complex t254 = mstmm_complex_times(B[7], t143);
+    const mstmm_complex t255 = mstmm_complex_times(B[16], t161);
+    const mstmm_complex t256 = mstmm_complex_plus(t254, t255);
+    const mstmm_complex t257 = mstmm_complex_times(B[25], t179);
+    const mstmm_complex t258 = mstmm_complex_plus(t256, t257);
+    const mstmm_complex t259 = mstmm_complex_times(B[34], t197);
+    const mstmm_complex t260 = mstmm_complex_plus(t258, t259);
+    const mstmm_complex t261 = mstmm_complex_plus(t129, t260);
+    z[7] = t261;
+    const mstmm_complex t262 = mstmm_complex_times(B[8], t143);
+    const mstmm_complex t263 = mstmm_complex_times(B[17], t161);
+    const mstmm_complex t264 = mstmm_complex_plus(t262, t263);
+    const mstmm_complex t265 = mstmm_complex_times(B[26], t179);
+    const mstmm_complex t266 = mstmm_complex_plus(t264, t265);
+    const mstmm_complex t267 = mstmm_complex_times(B[35], t197);
+    const mstmm_complex t268 = mstmm_complex_plus(t266, t267);
+    const mstmm_complex t269 = mstmm_complex_plus(t140, t268);
+    z[8] = t269;
+    return 0;
+}
+
+/* solution of a hinge with 5 free speeds for a right-hand side
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  w_I[3] (rad/s) angular velocity of the parent, parent axes
+ * in  v[3] (m/s) relative velocity of the hinge, body axes
+ * in  w[3] (rad/s) relative angular velocity of the hinge, body axes
+ * in  z_I[9] change of the parent's motion, parent axes
+ * in  B[5][9] motion along the unknowns
+ * in  gain[5][9] D^-1 times the rows by the motion
+ * in  y[5] D^-1 times the remainder of the rows
+ * out x[5] unknowns
+ * out z[9] change of the body's motion, own axes
+ */
+static int mstmm_complex_sweep_generic5_tangent_solution(const double *restrict Rc, const double *restrict r,
+    const double *restrict w_I, const double *restrict v, const double *restrict w,
+    const mstmm_complex *restrict z_I, const mstmm_complex *restrict B, const mstmm_complex *restrict gain,
+    const mstmm_complex *restrict y, mstmm_complex *restrict x, mstmm_complex *restrict z)
+{
+    const mstmm_complex t0 = mstmm_complex_scaled(Rc[0], z_I[0]);
+    const mstmm_complex t1 = mstmm_complex_scaled(Rc[3], z_I[1]);
+    const mstmm_complex t2 = mstmm_complex_plus(t0, t1);
+    const mstmm_complex t3 = mstmm_complex_scaled(Rc[6], z_I[2]);
+    const mstmm_complex t4 = mstmm_complex_plus(t2, t3);
+    const mstmm_complex t5 = mstmm_complex_times(gain[0], t4);
+    const mstmm_complex t6 = mstmm_complex_scaled(Rc[1], z_I[0]);
+    const mstmm_complex t7 = mstmm_complex_scaled(Rc[4], z_I[1]);
+    const mstmm_complex t8 = mstmm_complex_plus(t6, t7);
+    const mstmm_complex t9 = mstmm_complex_scaled(Rc[7], z_I[2]);
+    const mstmm_complex t10 = mstmm_complex_plus(t8, t9);
+    const mstmm_complex t11 = mstmm_complex_times(gain[1], t10);
+    const mstmm_complex t12 = mstmm_complex_plus(t5, t11);
+    const mstmm_complex t13 = mstmm_complex_scaled(Rc[2], z_I[0]);
+    const mstmm_complex t14 = mstmm_complex_scaled(Rc[5], z_I[1]);
+    const mstmm_complex t15 = mstmm_complex_plus(t13, t14);
+    const mstmm_complex t16 = mstmm_complex_scaled(Rc[8], z_I[2]);
+    const mstmm_complex t17 = mstmm_complex_plus(t15, t16);
+    const mstmm_complex t18 = mstmm_complex_times(gain[2], t17);
+    const mstmm_complex t19 = mstmm_complex_plus(t12, t18);
+    const mstmm_complex t20 = mstmm_complex_scaled(w[2], t10);
+    const mstmm_complex t21 = mstmm_complex_scaled(w[1], t17);
+    const mstmm_complex t22 = mstmm_complex_minus(t20, t21);
+    const mstmm_complex t23 = mstmm_complex_scaled(Rc[0], z_I[3]);
+    const mstmm_complex t24 = mstmm_complex_scaled(Rc[3], z_I[4]);
+    const mstmm_complex t25 = mstmm_complex_plus(t23, t24);
+    const mstmm_complex t26 = mstmm_complex_scaled(Rc[6], z_I[5]);
+    const mstmm_complex t27 = mstmm_complex_plus(t25, t26);
+    const mstmm_complex t28 = mstmm_complex_plus(t22, t27);
+    const mstmm_complex t29 = mstmm_complex_times(gain[3], t28);
+    const mstmm_complex t30 = mstmm_complex_plus(t19, t29);
+    const mstmm_complex t31 = mstmm_complex_scaled(w[0], t17);
+    const mstmm_complex t32 = mstmm_complex_scaled(w[2], t4);
+    const mstmm_complex t33 = mstmm_complex_minus(t31, t32);
+    const mstmm_complex t34 = mstmm_complex_scaled(Rc[1], z_I[3]);
+    const mstmm_complex t35 = mstmm_complex_scaled(Rc[4], z_I[4]);
+    const mstmm_complex t36 = mstmm_complex_plus(t34, t35);
+    const mstmm_complex t37 = mstmm_complex_scaled(Rc[7], z_I[5]);
+    const mstmm_complex t38 = mstmm_complex_plus(t36, t37);
+    const mstmm_complex t39 = mstmm_complex_plus(t33, t38);
+    const mstmm_complex t40 = mstmm_complex_times(gain[4], t39);
+    const mstmm_complex t41 = mstmm_complex_plus(t30, t40);
+    const mstmm_complex t42 = mstmm_complex_scaled(w[1], t4);
+    const mstmm_complex t43 = mstmm_complex_scaled(w[0], t10);
+    const mstmm_complex t44 = mstmm_complex_minus(t42, t43);
+    const mstmm_complex t45 = mstmm_complex_scaled(Rc[2], z_I[3]);
+    const mstmm_complex t46 = mstmm_complex_scaled(Rc[5], z_I[4]);
+    const mstmm_complex t47 = mstmm_complex_plus(t45, t46);
+    const mstmm_complex t48 = mstmm_complex_scaled(Rc[8], z_I[5]);
+    const mstmm_complex t49 = mstmm_complex_plus(t47, t48);
+    const mstmm_complex t50 = mstmm_complex_plus(t44, t49);
+    const mstmm_complex t51 = mstmm_complex_times(gain[5], t50);
+    const mstmm_complex t52 = mstmm_complex_plus(t41, t51);
+    const double t53 = v[2] * 2.0;
+    const mstmm_complex t54 = mstmm_complex_scaled(t53, t10);
+    const double t55 = v[1] * 2.0;
+    const mstmm_complex t56 = mstmm_complex_scaled(t55, t17);
+    const mstmm_complex t57 = mstmm_complex_minus(t54, t56);
+    const mstmm_complex t58 = mstmm_complex_scaled(r[2], z_I[4]);
+    const double t59 = r[1] * w_I[1];
+    const double t60 = r[2] * w_I[2];
+    const double t61 = t59 + t60;
+    const mstmm_complex t62 = mstmm_complex_scaled(t61, z_I[0]);
+    const double t63 = r[0] * w_I[1];
+    const double t64 = 2.0 * t63;
+    const double t65 = r[1] * w_I[0];
+    const double t66 = t64 - t65;
+    const mstmm_complex t67 = mstmm_complex_scaled(t66, z_I[1]);
+    const double t68 = r[0] * w_I[2];
+    const double t69 = 2.0 * t68;
+    const double t70 = r[2] * w_I[0];
+    const double t71 = t69 - t70;
+    const mstmm_complex t72 = mstmm_complex_scaled(t71, z_I[2]);
+    const mstmm_complex t73 = mstmm_complex_plus(t67, t72);
+    const mstmm_complex t74 = mstmm_complex_minus(t62, t73);
+    const mstmm_complex t75 = mstmm_complex_scaled(r[1], z_I[5]);
+    const mstmm_complex t76 = mstmm_complex_minus(t74, t75);
+    const mstmm_complex t77 = mstmm_complex_plus(t58, t76);
+    const mstmm_complex t78 = mstmm_complex_plus(z_I[6], t77);
+    const mstmm_complex t79 = mstmm_complex_scaled(Rc[0], t78);
+    const mstmm_complex t80 = mstmm_complex_scaled(r[0], z_I[5]);
+    const double t81 = r[0] * w_I[0];
+    const double t82 = t60 + t81;
+    const mstmm_complex t83 = mstmm_complex_scaled(t82, z_I[1]);
+    const double t84 = 2.0 * t65;
+    const double t85 = t84 - t63;
+    const mstmm_complex t86 = mstmm_complex_scaled(t85, z_I[0]);
+    const mstmm_complex t87 = mstmm_complex_minus(t83, t86);
+    const double t88 = r[1] * w_I[2];
+    const double t89 = 2.0 * t88;
+    const double t90 = r[2] * w_I[1];
+    const double t91 = t89 - t90;
+    const mstmm_complex t92 = mstmm_complex_scaled(t91, z_I[2]);
+    const mstmm_complex t93 = mstmm_complex_minus(t87, t92);
+    const mstmm_complex t94 = mstmm_complex_plus(t80, t93);
+    const mstmm_complex t95 = mstmm_complex_scaled(r[2], z_I[3]);
+    const mstmm_complex t96 = mstmm_complex_minus(t94, t95);
+    const mstmm_complex t97 = mstmm_complex_plus(z_I[7], t96);
+    const mstmm_complex t98 = mstmm_complex_scaled(Rc[3], t97);
+    const mstmm_complex t99 = mstmm_complex_plus(t79, t98);
+    const mstmm_complex t100 = mstmm_complex_scaled(r[1], z_I[3]);
+    const double t101 = t59 + t81;
+    const mstmm_complex t102 = mstmm_complex_scaled(t101, z_I[2]);
+    const double t103 = 2.0 * t70;
+    const double t104 = t103 - t68;
+    const mstmm_complex t105 = mstmm_complex_scaled(t104, z_I[0]);
+    const mstmm_complex t106 = mstmm_complex_minus(t102, t105);
+    const double t107 = 2.0 * t90;
+    const double t108 = t107 - t88;
+    const mstmm_complex t109 = mstmm_complex_scaled(t108, z_I[1]);
+    const mstmm_complex t110 = mstmm_complex_minus(t106, t109);
+    const mstmm_complex t111 = mstmm_complex_scaled(r[0], z_I[4]);
+    const mstmm_complex t112 = mstmm_complex_minus(t110, t111);
+    const mstmm_complex t113 = mstmm_complex_plus(t100, t112);
+    const mstmm_complex t114 = mstmm_complex_plus(z_I[8], t113);
+    const mstmm_complex t115 = mstmm_complex_scaled(Rc[6], t114);
+    const mstmm_complex t116 = mstmm_complex_plus(t99, t115);
+    const mstmm_complex t117 = mstmm_complex_plus(t57, t116);
+    const mstmm_complex t118 = mstmm_complex_times(gain[6], t117);
+    const mstmm_complex t119 = mstmm_complex_plus(t52, t118);
+    const double t120 = v[0] * 2.0;
+    const mstmm_complex t121 = mstmm_complex_scaled(t120, t17);
+    const mstmm_complex t122 = mstmm_complex_scaled(t53, t4);
+    const mstmm_complex t123 = mstmm_complex_minus(t121, t122);
+    const mstmm_complex t124 = mstmm_complex_scaled(Rc[1], t78);
+    const mstmm_complex t125 = mstmm_complex_scaled(Rc[4], t97);
+    const mstmm_complex t126 = mstmm_complex_plus(t124, t125);
+    const mstmm_complex t127 = mstmm_complex_scaled(Rc[7], t114);
+    const mstmm_complex t128 = mstmm_complex_plus(t126, t127);
+    const mstmm_complex t129 = mstmm_complex_plus(t123, t128);
+    const mstmm_complex t130 = mstmm_complex_times(gain[7], t129);
+    const mstmm_complex t131 = mstmm_complex_plus(t119, t130);
+    const mstmm_complex t132 = mstmm_complex_scaled(t55, t4);
+    const mstmm_complex t133 = mstmm_complex_scaled(t120, t10);
+    const mstmm_complex t134 = mstmm_complex_minus(t132, t133);
+    const mstmm_complex t135 = mstmm_complex_scaled(Rc[2], t78);
+    const mstmm_complex t136 = mstmm_complex_scaled(Rc[5], t97);
+    const mstmm_complex t137 = mstmm_complex_plus(t135, t136);
+    const mstmm_complex t138 = mstmm_complex_scaled(Rc[8], t114);
+    const mstmm_complex t139 = mstmm_complex_plus(t137, t138);
+    const mstmm_complex t140 = mstmm_complex_plus(t134, t139);
+    const mstmm_complex t141 = mstmm_complex_times(gain[8], t140);
+    const mstmm_complex t142 = mstmm_complex_plus(t131, t141);
+    const mstmm_complex t143 = mstmm_complex_minus(y[0], t142);
+    x[0] = t143;
+    const mstmm_complex t144 = mstmm_complex_times(gain[9], t4);
+    const mstmm_complex t145 = mstmm_complex_times(gain[10], t10);
+    const mstmm_complex t146 = mstmm_complex_plus(t144, t145);
+    const mstmm_complex t147 = mstmm_complex_times(gain[11], t17);
+    const mstmm_complex t148 = mstmm_complex_plus(t146, t147);
+    const mstmm_complex t149 = mstmm_complex_times(gain[12], t28);
+    const mstmm_complex t150 = mstmm_complex_plus(t148, t149);
+    const mstmm_complex t151 = mstmm_complex_times(gain[13], t39);
+    const mstmm_complex t152 = mstmm_complex_plus(t150, t151);
+    const mstmm_complex t153 = mstmm_complex_times(gain[14], t50);
+    const mstmm_complex t154 = mstmm_complex_plus(t152, t153);
+    const mstmm_complex t155 = mstmm_complex_times(gain[15], t117);
+    const mstmm_complex t156 = mstmm_complex_plus(t154, t155);
+    const mstmm_complex t157 = mstmm_complex_times(gain[16], t129);
+    const mstmm_complex t158 = mstmm_complex_plus(t156, t157);
+    const mstmm_complex t159 = mstmm_complex_times(gain[17], t140);
+    const mstmm_complex t160 = mstmm_complex_plus(t158, t159);
+    const mstmm_complex t161 = mstmm_complex_minus(y[1], t160);
+    x[1] = t161;
+    const mstmm_complex t162 = mstmm_complex_times(gain[18], t4);
+    const mstmm_complex t163 = mstmm_complex_times(gain[19], t10);
+    const mstmm_complex t164 = mstmm_complex_plus(t162, t163);
+    const mstmm_complex t165 = mstmm_complex_times(gain[20], t17);
+    const mstmm_complex t166 = mstmm_complex_plus(t164, t165);
+    const mstmm_complex t167 = mstmm_complex_times(gain[21], t28);
+    const mstmm_complex t168 = mstmm_complex_plus(t166, t167);
+    const mstmm_complex t169 = mstmm_complex_times(gain[22], t39);
+    const mstmm_complex t170 = mstmm_complex_plus(t168, t169);
+    const mstmm_complex t171 = mstmm_complex_times(gain[23], t50);
+    const mstmm_complex t172 = mstmm_complex_plus(t170, t171);
+    const mstmm_complex t173 = mstmm_complex_times(gain[24], t117);
+    const mstmm_complex t174 = mstmm_complex_plus(t172, t173);
+    const mstmm_complex t175 = mstmm_complex_times(gain[25], t129);
+    const mstmm_complex t176 = mstmm_complex_plus(t174, t175);
+    const mstmm_complex t177 = mstmm_complex_times(gain[26], t140);
+    const mstmm_complex t178 = mstmm_complex_plus(t176, t177);
+    const mstmm_complex t179 = mstmm_complex_minus(y[2], t178);
+    x[2] = t179;
+    const mstmm_complex t180 = mstmm_complex_times(gain[27], t4);
+    const mstmm_complex t181 = mstmm_complex_times(gain[28], t10);
+    const mstmm_complex t182 = mstmm_complex_plus(t180, t181);
+    const mstmm_complex t183 = mstmm_complex_times(gain[29], t17);
+    const mstmm_complex t184 = mstmm_complex_plus(t182, t183);
+    const mstmm_complex t185 = mstmm_complex_times(gain[30], t28);
+    const mstmm_complex t186 = mstmm_complex_plus(t184, t185);
+    const mstmm_complex t187 = mstmm_complex_times(gain[31], t39);
+    const mstmm_complex t188 = mstmm_complex_plus(t186, t187);
+    const mstmm_complex t189 = mstmm_complex_times(gain[32], t50);
+    const mstmm_complex t190 = mstmm_complex_plus(t188, t189);
+    const mstmm_complex t191 = mstmm_complex_times(gain[33], t117);
+    const mstmm_complex t192 = mstmm_complex_plus(t190, t191);
+    const mstmm_complex t193 = mstmm_complex_times(gain[34], t129);
+    const mstmm_complex t194 = mstmm_complex_plus(t192, t193);
+    const mstmm_complex t195 = mstmm_complex_times(gain[35], t140);
+    const mstmm_complex t196 = mstmm_complex_plus(t194, t195);
+    const mstmm_complex t197 = mstmm_complex_minus(y[3], t196);
+    x[3] = t197;
+    const mstmm_complex t198 = mstmm_complex_times(gain[36], t4);
+    const mstmm_complex t199 = mstmm_complex_times(gain[37], t10);
+    const mstmm_complex t200 = mstmm_complex_plus(t198, t199);
+    const mstmm_complex t201 = mstmm_complex_times(gain[38], t17);
+    const mstmm_complex t202 = mstmm_complex_plus(t200, t201);
+    const mstmm_complex t203 = mstmm_complex_times(gain[39], t28);
+    const mstmm_complex t204 = mstmm_complex_plus(t202, t203);
+    const mstmm_complex t205 = mstmm_complex_times(gain[40], t39);
+    const mstmm_complex t206 = mstmm_complex_plus(t204, t205);
+    const mstmm_complex t207 = mstmm_complex_times(gain[41], t50);
+    const mstmm_complex t208 = mstmm_complex_plus(t206, t207);
+    const mstmm_complex t209 = mstmm_complex_times(gain[42], t117);
+    const mstmm_complex t210 = mstmm_complex_plus(t208, t209);
+    const mstmm_complex t211 = mstmm_complex_times(gain[43], t129);
+    const mstmm_complex t212 = mstmm_complex_plus(t210, t211);
+    const mstmm_complex t213 = mstmm_complex_times(gain[44], t140);
+    const mstmm_complex t214 = mstmm_complex_plus(t212, t213);
+    const mstmm_complex t215 = mstmm_complex_minus(y[4], t214);
+    x[4] = t215;
+    const mstmm_complex t216 = mstmm_complex_times(B[0], t143);
+    const mstmm_complex t217 = mstmm_complex_times(B[9], t161);
+    const mstmm_complex t218 = mstmm_complex_plus(t216, t217);
+    const mstmm_complex t219 = mstmm_complex_times(B[18], t179);
+    const mstmm_complex t220 = mstmm_complex_plus(t218, t219);
+    const mstmm_complex t221 = mstmm_complex_times(B[27], t197);
+    const mstmm_complex t222 = mstmm_complex_plus(t220, t221);
+    const mstmm_complex t223 = mstmm_complex_times(B[36], t215);
+    const mstmm_complex t224 = mstmm_complex_plus(t222, t223);
+    const mstmm_complex t225 = mstmm_complex_plus(t4, t224);
+    z[0] = t225;
+    const mstmm_complex t226 = mstmm_complex_times(B[1], t143);
+    const mstmm_complex t227 = mstmm_complex_times(B[10], t161);
+    const mstmm_complex t228 = mstmm_complex_plus(t226, t227);
+    const mstmm_complex t229 = mstmm_complex_times(B[19], t179);
+    const mstmm_complex t230 = mstmm_complex_plus(t228, t229);
+    const mstmm_complex t231 = mstmm_complex_times(B[28], t197);
+    const mstmm_complex t232 = mstmm_complex_plus(t230, t231);
+    const mstmm_complex t233 = mstmm_complex_times(B[37], t215);
+    const mstmm_complex t234 = mstmm_complex_plus(t232, t233);
+    const mstmm_complex t235 = mstmm_complex_plus(t10, t234);
+    z[1] = t235;
+    const mstmm_complex t236 = mstmm_complex_times(B[2], t143);
+    const mstmm_complex t237 = mstmm_complex_times(B[11], t161);
+    const mstmm_complex t238 = mstmm_complex_plus(t236, t237);
+    const mstmm_complex t239 = mstmm_complex_times(B[20], t179);
+    const mstmm_complex t240 = mstmm_complex_plus(t238, t239);
+    const mstmm_complex t241 = mstmm_complex_times(B[29], t197);
+    const mstmm_complex t242 = mstmm_complex_plus(t240, t241);
+    const mstmm_complex t243 = mstmm_complex_times(B[38], t215);
+    const mstmm_complex t244 = mstmm_complex_plus(t242, t243);
+    const mstmm_complex t245 = mstmm_complex_plus(t17, t244);
+    z[2] = t245;
+    const mstmm_complex t246 = mstmm_complex_times(B[3], t143);
+    const mstmm_complex t247 = mstmm_complex_times(B[12], t161);
+    const mstmm_complex t248 = mstmm_complex_plus(t246, t247);
+    const mstmm_complex t249 = mstmm_complex_times(B[21], t179);
+    const mstmm_complex t250 = mstmm_complex_plus(t248, t249);
+    const mstmm_complex t251 = mstmm_complex_times(B[30], t197);
+    const mstmm_complex t252 = mstmm_complex_plus(t250, t251);
+    const mstmm_complex t253 = mstmm_complex_times(B[39], t215);
+    const mstmm_complex t254 = mstmm_complex_plus(t252, t253);
+    const mstmm_complex t255 = mstmm_complex_plus(t28, t254);
+    z[3] = t255;
+    const mstmm_complex t256 = mstmm_complex_times(B[4], t143);
+    const mstmm_complex t257 = mstmm_complex_times(B[13], t161);
+    const mstmm_complex t258 = mstmm_complex_plus(t256, t257);
+    const mstmm_complex t259 = mstmm_complex_times(B[22], t179);
+    const mstmm_complex t260 = mstmm_complex_plus(t258, t259);
+    const mstmm_complex t261 = mstmm_complex_times(B[31], t197);
+    const mstmm_complex t262 = mstmm_complex_plus(t260, t261);
+    const mstmm_complex t263 = mstmm_complex_times(B[40], t215);
+    const mstmm_complex t264 = mstmm_complex_plus(t262, t263);
+    const mstmm_complex t265 = mstmm_complex_plus(t39, t264);
+    z[4] = t265;
+    const mstmm_complex t266 = mstmm_complex_times(B[5], t143);
+    const mstmm_complex t267 = mstmm_complex_times(B[14], t161);
+    const mstmm_complex t268 = mstmm_complex_plus(t266, t267);
+    const mstmm_complex t269 = mstmm_complex_times(B[23], t179);
+    const mstmm_complex t270 = mstmm_complex_plus(t268, t269);
+    const mstmm_complex t271 = mstmm_complex_times(B[32], t197);
+    const mstmm_complex t272 = mstmm_complex_plus(t270, t271);
+    const mstmm_complex t273 = mstmm_complex_times(B[41], t215);
+    const mstmm_complex t274 = mstmm_complex_plus(t272, t273);
+    const mstmm_complex t275 = mstmm_complex_plus(t50, t274);
+    z[5] = t275;
+    const mstmm_complex t276 = mstmm_complex_times(B[6], t143);
+    const mstmm_complex t277 = mstmm_complex_times(B[15], t161);
+    const mstmm_complex t278 = mstmm_complex_plus(t276, t277);
+    const mstmm_complex t279 = mstmm_complex_times(B[24], t179);
+    const mstmm_complex t280 = mstmm_complex_plus(t278, t279);
+    const mstmm_complex t281 = mstmm_complex_times(B[33], t197);
+    const mstmm_complex t282 = mstmm_complex_plus(t280, t281);
+    const mstmm_complex t283 = mstmm_complex_times(B[42], t215);
+    const mstmm_complex t284 = mstmm_complex_plus(t282, t283);
+    const mstmm_complex t285 = mstmm_complex_plus(t117, t284);
+    z[6] = t285;
+    const mstmm_complex t286 = mstmm_complex_times(B[7], t143);
+    const mstmm_complex t287 = mstmm_complex_times(B[16], t161);
+    const mstmm_complex t288 = mstmm_complex_plus(t286, t287);
+    const mstmm_complex t289 = mstmm_complex_times(B[25], t179);
+    const mstmm_complex t290 = mstmm_complex_plus(t288, t289);
+    const mstmm_complex t291 = mstmm_complex_times(B[34], t197);
+    const mstmm_complex t292 = mstmm_complex_plus(t290, t291);
+    const mstmm_complex t293 = mstmm_complex_times(B[43], t215);
+    const mstmm_complex t294 = mstmm_complex_plus(t292, t293);
+    const mstmm_complex t295 = mstmm_complex_plus(t129, t294);
+    z[7] = t295;
+    const mstmm_complex t296 = mstmm_complex_times(B[8], t143);
+    const mstmm_complex t297 = mstmm_complex_times(B[17], t161);
+    const mstmm_complex t298 = mstmm_complex_plus(t296, t297);
+    const mstmm_complex t299 = mstmm_complex_times(B[26], t179);
+    const mstmm_complex t300 = mstmm_complex_plus(t298, t299);
+    const mstmm_complex t301 = mstmm_complex_times(B[35], t197);
+    const mstmm_complex t302 = mstmm_complex_plus(t300, t301);
+    const mstmm_complex t303 = mstmm_complex_times(B[44], t215);
+    const mstmm_complex t304 = mstmm_complex_plus(t302, t303);
+    const mstmm_complex t305 = mstmm_complex_plus(t140, t304);
+    z[8] = t305;
+    return 0;
+}
+
+/* solution of a hinge with 6 free speeds for a right-hand side
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  w_I[3] (rad/s) angular velocity of the parent, parent axes
+ * in  v[3] (m/s) relative velocity of the hinge, body axes
+ * in  w[3] (rad/s) relative angular velocity of the hinge, body axes
+ * in  z_I[9] change of the parent's motion, parent axes
+ * in  B[6][9] motion along the unknowns
+ * in  gain[6][9] D^-1 times the rows by the motion
+ * in  y[6] D^-1 times the remainder of the rows
+ * out x[6] unknowns
+ * out z[9] change of the body's motion, own axes
+ */
+static int mstmm_complex_sweep_generic6_tangent_solution(const double *restrict Rc, const double *restrict r,
+    const double *restrict w_I, const double *restrict v, const double *restrict w,
+    const mstmm_complex *restrict z_I, const mstmm_complex *restrict B, const mstmm_complex *restrict gain,
+    const mstmm_complex *restrict y, mstmm_complex *restrict x, mstmm_complex *restrict z)
+{
+    const mstmm_complex t0 = mstmm_complex_scaled(Rc[0], z_I[0]);
+    const mstmm_complex t1 = mstmm_complex_scaled(Rc[3], z_I[1]);
+    const mstmm_complex t2 = mstmm_complex_plus(t0, t1);
+    const mstmm_complex t3 = mstmm_complex_scaled(Rc[6], z_I[2]);
+    const mstmm_complex t4 = mstmm_complex_plus(t2, t3);
+    const mstmm_complex t5 = mstmm_complex_times(gain[0], t4);
+    const mstmm_complex t6 = mstmm_complex_scaled(Rc[1], z_I[0]);
+    const mstmm_complex t7 = mstmm_complex_scaled(Rc[4], z_I[1]);
+    const mstmm_complex t8 = mstmm_complex_plus(t6, t7);
+    const mstmm_complex t9 = mstmm_complex_scaled(Rc[7], z_I[2]);
+    const mstmm_complex t10 = mstmm_complex_plus(t8, t9);
+    const mstmm_complex t11 = mstmm_complex_times(gain[1], t10);
+    const mstmm_complex t12 = mstmm_complex_plus(t5, t11);
+    const mstmm_complex t13 = mstmm_complex_scaled(Rc[2], z_I[0]);
+    const mstmm_complex t14 = mstmm_complex_scaled(Rc[5], z_I[1]);
+    const mstmm_complex t15 = mstmm_complex_plus(t13, t14);
+    const mstmm_complex t16 = mstmm_complex_scaled(Rc[8], z_I[2]);
+    const mstmm_complex t17 = mstmm_complex_plus(t15, t16);
+    const mstmm_complex t18 = mstmm_complex_times(gain[2], t17);
+    const mstmm_complex t19 = mstmm_complex_plus(t12, t18);
+    const mstmm_complex t20 = mstmm_complex_scaled(w[2], t10);
+    const mstmm_complex t21 = mstmm_complex_scaled(w[1], t17);
+    const mstmm_complex t22 = mstmm_complex_minus(t20, t21);
+    const mstmm_complex t23 = mstmm_complex_scaled(Rc[0], z_I[3]);
+    const mstmm_complex t24 = mstmm_complex_scaled(Rc[3], z_I[4]);
+    const mstmm_complex t25 = mstmm_complex_plus(t23, t24);
+    const mstmm_complex t26 = mstmm_complex_scaled(Rc[6], z_I[5]);
+    const mstmm_complex t27 = mstmm_complex_plus(t25, t26);
+    const mstmm_complex t28 = mstmm_complex_plus(t22, t27);
+    const mstmm_complex t29 = mstmm_complex_times(gain[3], t28);
+    const mstmm_complex t30 = mstmm_complex_plus(t19, t29);
+    const mstmm_complex t31 = mstmm_complex_scaled(w[0], t17);
+    const mstmm_complex t32 = mstmm_complex_scaled(w[2], t4);
+    const mstmm_complex t33 = mstmm_complex_minus(t31, t32);
+    const mstmm_complex t34 = mstmm_complex_scaled(Rc[1], z_I[3]);
+    const mstmm_complex t35 = mstmm_complex_scaled(Rc[4], z_I[4]);
+    const mstmm_complex t36 = mstmm_complex_plus(t34, t35);
+    const mstmm_complex t37 = mstmm_complex_scaled(Rc[7], z_I[5]);
+    const mstmm_complex t38 = mstmm_complex_plus(t36, t37);
+    const mstmm_complex t39 = mstmm_complex_plus(t33, t38);
+    const mstmm_complex t40 = mstmm_complex_times(gain[4], t39);
+    const mstmm_complex t41 = mstmm_complex_plus(t30, t40);
+    const mstmm_complex t42 = mstmm_complex_scaled(w[1], t4);
+    const mstmm_complex t43 = mstmm_complex_scaled(w[0], t10);
+    const mstmm_complex t44 = mstmm_complex_minus(t42, t43);
+    const mstmm_complex t45 = mstmm_complex_scaled(Rc[2], z_I[3]);
+    const mstmm_complex t46 = mstmm_complex_scaled(Rc[5], z_I[4]);
+    const mstmm_complex t47 = mstmm_complex_plus(t45, t46);
+    const mstmm_complex t48 = mstmm_complex_scaled(Rc[8], z_I[5]);
+    const mstmm_complex t49 = mstmm_complex_plus(t47, t48);
+    const mstmm_complex t50 = mstmm_complex_plus(t44, t49);
+    const mstmm_complex t51 = mstmm_complex_times(gain[5], t50);
+    const mstmm_complex t52 = mstmm_complex_plus(t41, t51);
+    const double t53 = v[2] * 2.0;
+    const mstmm_complex t54 = mstmm_complex_scaled(t53, t10);
+    const double t55 = v[1] * 2.0;
+    const mstmm_complex t56 = mstmm_complex_scaled(t55, t17);
+    const mstmm_complex t57 = mstmm_complex_minus(t54, t56);
+    const mstmm_complex t58 = mstmm_complex_scaled(r[2], z_I[4]);
+    const double t59 = r[1] * w_I[1];
+    const double t60 = r[2] * w_I[2];
+    const double t61 = t59 + t60;
+    const mstmm_complex t62 = mstmm_complex_scaled(t61, z_I[0]);
+    const double t63 = r[0] * w_I[1];
+    const double t64 = 2.0 * t63;
+    const double t65 = r[1] * w_I[0];
+    const double t66 = t64 - t65;
+    const mstmm_complex t67 = mstmm_complex_scaled(t66, z_I[1]);
+    const double t68 = r[0] * w_I[2];
+    const double t69 = 2.0 * t68;
+    const double t70 = r[2] * w_I[0];
+    const double t71 = t69 - t70;
+    const mstmm_complex t72 = mstmm_complex_scaled(t71, z_I[2]);
+    const mstmm_complex t73 = mstmm_complex_plus(t67, t72);
+    const mstmm_complex t74 = mstmm_complex_minus(t62, t73);
+    const mstmm_complex t75 = mstmm_complex_scaled(r[1], z_I[5]);
+    const mstmm_complex t76 = mstmm_complex_minus(t74, t75);
+    const mstmm_complex t77 = mstmm_complex_plus(t58, t76);
+    const mstmm_complex t78 = mstmm_complex_plus(z_I[6], t77);
+    const mstmm_complex t79 = mstmm_complex_scaled(Rc[0], t78);
+    const mstmm_complex t80 = mstmm_complex_scaled(r[0], z_I[5]);
+    const double t81 = r[0] * w_I[0];
+    const double t82 = t60 + t81;
+    const mstmm_complex t83 = mstmm_complex_scaled(t82, z_I[1]);
+    const double t84 = 2.0 * t65;
+    const double t85 = t84 - t63;
+    const mstmm_complex t86 = mstmm_complex_scaled(t85, z_I[0]);
+    const mstmm_complex t87 = mstmm_complex_minus(t83, t86);
+    const double t88 = r[1] * w_I[2];
+    const double t89 = 2.0 * t88;
+    const double t90 = r[2] * w_I[1];
+    const double t91 = t89 - t90;
+    const mstmm_complex t92 = mstmm_complex_scaled(t91, z_I[2]);
+    const mstmm_complex t93 = mstmm_complex_minus(t87, t92);
+    const mstmm_complex t94 = mstmm_complex_plus(t80, t93);
+    const mstmm_complex t95 = mstmm_complex_scaled(r[2], z_I[3]);
+    const mstmm_complex t96 = mstmm_complex_minus(t94, t95);
+    const mstmm_complex t97 = mstmm_complex_plus(z_I[7], t96);
+    const mstmm_complex t98 = mstmm_complex_scaled(Rc[3], t97);
+    const mstmm_complex t99 = mstmm_complex_plus(t79, t98);
+    const mstmm_complex t100 = mstmm_complex_scaled(r[1], z_I[3]);
+    const double t101 = t59 + t81;
+    const mstmm_complex t102 = mstmm_complex_scaled(t101, z_I[2]);
+    const double t103 = 2.0 * t70;
+    const double t104 = t103 - t68;
+    const mstmm_complex t105 = mstmm_complex_scaled(t104, z_I[0]);
+    const mstmm_complex t106 = mstmm_complex_minus(t102, t105);
+    const double t107 = 2.0 * t90;
+    const double t108 = t107 - t88;
+    const mstmm_complex t109 = mstmm_complex_scaled(t108, z_I[1]);
+    const mstmm_complex t110 = mstmm_complex_minus(t106, t109);
+    const mstmm_complex t111 = mstmm_complex_scaled(r[0], z_I[4]);
+    const mstmm_complex t112 = mstmm_complex_minus(t110, t111);
+    const mstmm_complex t113 = mstmm_complex_plus(t100, t112);
+    const mstmm_complex t114 = mstmm_complex_plus(z_I[8], t113);
+    const mstmm_complex t115 = mstmm_complex_scaled(Rc[6], t114);
+    const mstmm_complex t116 = mstmm_complex_plus(t99, t115);
+    const mstmm_complex t117 = mstmm_complex_plus(t57, t116);
+    const mstmm_complex t118 = mstmm_complex_times(gain[6], t117);
+    const mstmm_complex t119 = mstmm_complex_plus(t52, t118);
+    const double t120 = v[0] * 2.0;
+    const mstmm_complex t121 = mstmm_complex_scaled(t120, t17);
+    const mstmm_complex t122 = mstmm_complex_scaled(t53, t4);
+    const mstmm_complex t123 = mstmm_complex_minus(t121, t122);
+    const mstmm_complex t124 = mstmm_complex_scaled(Rc[1], t78);
+    const mstmm_complex t125 = mstmm_complex_scaled(Rc[4], t97);
+    const mstmm_complex t126 = mstmm_complex_plus(t124, t125);
+    const mstmm_complex t127 = mstmm_complex_scaled(Rc[7], t114);
+    const mstmm_complex t128 = mstmm_complex_plus(t126, t127);
+    const mstmm_complex t129 = mstmm_complex_plus(t123, t128);
+    const mstmm_complex t130 = mstmm_complex_times(gain[7], t129);
+    const mstmm_complex t131 = mstmm_complex_plus(t119, t130);
+    const mstmm_complex t132 = mstmm_complex_scaled(t55, t4);
+    const mstmm_complex t133 = mstmm_complex_scaled(t120, t10);
+    const mstmm_complex t134 = mstmm_complex_minus(t132, t133);
+    const mstmm_complex t135 = mstmm_complex_scaled(Rc[2], t78);
+    const mstmm_complex t136 = mstmm_complex_scaled(Rc[5], t97);
+    const mstmm_complex t137 = mstmm_complex_plus(t135, t136);
+    const mstmm_complex t138 = mstmm_complex_scaled(Rc[8], t114);
+    const mstmm_complex t139 = mstmm_complex_plus(t137, t138);
+    const mstmm_complex t140 = mstmm_complex_plus(t134, t139);
+    const mstmm_complex t141 = mstmm_complex_times(gain[8], t140);
+    const mstmm_complex t142 = mstmm_complex_plus(t131, t141);
+    const mstmm_complex t143 = mstmm_complex_minus(y[0], t142);
+    x[0] = t143;
+    const mstmm_complex t144 = mstmm_complex_times(gain[9], t4);
+    const mstmm_complex t145 = mstmm_complex_times(gain[10], t10);
+    const mstmm_complex t146 = mstmm_complex_plus(t144, t145);
+    const mstmm_complex t147 = mstmm_complex_times(gain[11], t17);
+    const mstmm_complex t148 = mstmm_complex_plus(t146, t147);
+    const mstmm_complex t149 = mstmm_complex_times(gain[12], t28);
+    const mstmm_complex t150 = mstmm_complex_plus(t148, t149);
+    const mstmm_complex t151 = mstmm_complex_times(gain[13], t39);
+    const mstmm_complex t152 = mstmm_complex_plus(t150, t151);
+    const mstmm_complex t153 = mstmm_complex_times(gain[14], t50);
+    const mstmm_complex t154 = mstmm_complex_plus(t152, t153);
+    const mstmm_complex t155 = mstmm_complex_times(gain[15], t117);
+    const mstmm_complex t156 = mstmm_complex_plus(t154, t155);
+    const mstmm_complex t157 = mstmm_complex_times(gain[16], t129);
+    const mstmm_complex t158 = mstmm_complex_plus(t156, t157);
+    const mstmm_complex t159 = mstmm_complex_times(gain[17], t140);
+    const mstmm_complex t160 = mstmm_complex_plus(t158, t159);
+    const mstmm_complex t161 = mstmm_complex_minus(y[1], t160);
+    x[1] = t161;
+    const mstmm_complex t162 = mstmm_complex_times(gain[18], t4);
+    const mstmm_complex t163 = mstmm_complex_times(gain[19], t10);
+    const mstmm_complex t164 = mstmm_complex_plus(t162, t163);
+    const mstmm_complex t165 = mstmm_complex_times(gain[20], t17);
+    const mstmm_complex t166 = mstmm_complex_plus(t164, t165);
+    const mstmm_complex t167 = mstmm_complex_times(gain[21], t28);
+    const mstmm_complex t168 = mstmm_complex_plus(t166, t167);
+    const mstmm_complex t169 = mstmm_complex_times(gain[22], t39);
+    const mstmm_complex t170 = mstmm_complex_plus(t168, t169);
+    const mstmm_complex t171 = mstmm_complex_times(gain[23], t50);
+    const mstmm_complex t172 = mstmm_complex_plus(t170, t171);
+    const mstmm_complex t173 = mstmm_complex_times(gain[24], t117);
+    const mstmm_complex t174 = mstmm_complex_plus(t172, t173);
+    const mstmm_complex t175 = mstmm_complex_times(gain[25], t129);
+    const mstmm_complex t176 = mstmm_complex_plus(t174, t175);
+    const mstmm_complex t177 = mstmm_complex_times(gain[26], t140);
+    const mstmm_complex t178 = mstmm_complex_plus(t176, t177);
+    const mstmm_complex t179 = mstmm_complex_minus(y[2], t178);
+    x[2] = t179;
+    const mstmm_complex t180 = mstmm_complex_times(gain[27], t4);
+    const mstmm_complex t181 = mstmm_complex_times(gain[28], t10);
+    const mstmm_complex t182 = mstmm_complex_plus(t180, t181);
+    const mstmm_complex t183 = mstmm_complex_times(gain[29], t17);
+    const mstmm_complex t184 = mstmm_complex_plus(t182, t183);
+    const mstmm_complex t185 = mstmm_complex_times(gain[30], t28);
+    const mstmm_complex t186 = mstmm_complex_plus(t184, t185);
+    const mstmm_complex t187 = mstmm_complex_times(gain[31], t39);
+    const mstmm_complex t188 = mstmm_complex_plus(t186, t187);
+    const mstmm_complex t189 = mstmm_complex_times(gain[32], t50);
+    const mstmm_complex t190 = mstmm_complex_plus(t188, t189);
+    const mstmm_complex t191 = mstmm_complex_times(gain[33], t117);
+    const mstmm_complex t192 = mstmm_complex_plus(t190, t191);
+    const mstmm_complex t193 = mstmm_complex_times(gain[34], t129);
+    const mstmm_complex t194 = mstmm_complex_plus(t192, t193);
+    const mstmm_complex t195 = mstmm_complex_times(gain[35], t140);
+    const mstmm_complex t196 = mstmm_complex_plus(t194, t195);
+    const mstmm_complex t197 = mstmm_complex_minus(y[3], t196);
+    x[3] = t197;
+    const mstmm_complex t198 = mstmm_complex_times(gain[36], t4);
+    const mstmm_complex t199 = mstmm_complex_times(gain[37], t10);
+    const mstmm_complex t200 = mstmm_complex_plus(t198, t199);
+    const mstmm_complex t201 = mstmm_complex_times(gain[38], t17);
+    const mstmm_complex t202 = mstmm_complex_plus(t200, t201);
+    const mstmm_complex t203 = mstmm_complex_times(gain[39], t28);
+    const mstmm_complex t204 = mstmm_complex_plus(t202, t203);
+    const mstmm_complex t205 = mstmm_complex_times(gain[40], t39);
+    const mstmm_complex t206 = mstmm_complex_plus(t204, t205);
+    const mstmm_complex t207 = mstmm_complex_times(gain[41], t50);
+    const mstmm_complex t208 = mstmm_complex_plus(t206, t207);
+    const mstmm_complex t209 = mstmm_complex_times(gain[42], t117);
+    const mstmm_complex t210 = mstmm_complex_plus(t208, t209);
+    const mstmm_complex t211 = mstmm_complex_times(gain[43], t129);
+    const mstmm_complex t212 = mstmm_complex_plus(t210, t211);
+    const mstmm_complex t213 = mstmm_complex_times(gain[44], t140);
+    const mstmm_complex t214 = mstmm_complex_plus(t212, t213);
+    const mstmm_complex t215 = mstmm_complex_minus(y[4], t214);
+    x[4] = t215;
+    const mstmm_complex t216 = mstmm_complex_times(gain[45], t4);
+    const mstmm_complex t217 = mstmm_complex_times(gain[46], t10);
+    const mstmm_complex t218 = mstmm_complex_plus(t216, t217);
+    const mstmm_complex t219 = mstmm_complex_times(gain[47], t17);
+    const mstmm_complex t220 = mstmm_complex_plus(t218, t219);
+    const mstmm_complex t221 = mstmm_complex_times(gain[48], t28);
+    const mstmm_complex t222 = mstmm_complex_plus(t220, t221);
+    const mstmm_complex t223 = mstmm_complex_times(gain[49], t39);
+    const mstmm_complex t224 = mstmm_complex_plus(t222, t223);
+    const mstmm_complex t225 = mstmm_complex_times(gain[50], t50);
+    const mstmm_complex t226 = mstmm_complex_plus(t224, t225);
+    const mstmm_complex t227 = mstmm_complex_times(gain[51], t117);
+    const mstmm_complex t228 = mstmm_complex_plus(t226, t227);
+    const mstmm_complex t229 = mstmm_complex_times(gain[52], t129);
+    const mstmm_complex t230 = mstmm_complex_plus(t228, t229);
+    const mstmm_complex t231 = mstmm_complex_times(gain[53], t140);
+    const mstmm_complex t232 = mstmm_complex_plus(t230, t231);
+    const mstmm_complex t233 = mstmm_complex_minus(y[5], t232);
+    x[5] = t233;
+    const mstmm_complex t234 = mstmm_complex_times(B[0], t143);
+    const mstmm_complex t235 = mstmm_complex_times(B[9], t161);
+    const mstmm_complex t236 = mstmm_complex_plus(t234, t235);
+    const mstmm_complex t237 = mstmm_complex_times(B[18], t179);
+    const mstmm_complex t238 = mstmm_complex_plus(t236, t237);
+    const mstmm_complex t239 = mstmm_complex_times(B[27], t197);
+    const mstmm_complex t240 = mstmm_complex_plus(t238, t239);
+    const mstmm_complex t241 = mstmm_complex_times(B[36], t215);
+    const mstmm_complex t242 = mstmm_complex_plus(t240, t241);
+    const mstmm_complex t243 = mstmm_complex_times(B[45], t233);
+    const mstmm_complex t244 = mstmm_complex_plus(t242, t243);
+    const mstmm_complex t245 = mstmm_complex_plus(t4, t244);
+    z[0] = t245;
+    const mstmm_complex t246 = mstmm_complex_times(B[1], t143);
+    const mstmm_complex t247 = mstmm_complex_times(B[10], t161);
+    const mstmm_complex t248 = mstmm_complex_plus(t246, t247);
+    const mstmm_complex t249 = mstmm_complex_times(B[19], t179);
+    const mstmm_complex t250 = mstmm_complex_plus(t248, t249);
+    const mstmm_complex t251 = mstmm_complex_times(B[28], t197);
+    const mstmm_complex t252 = mstmm_complex_plus(t250, t251);
+    const mstmm_complex t253 = mstmm_complex_times(B[37], t215);
+    const mstmm_complex t254 = mstmm_complex_plus(t252, t253);
+    const mstmm_complex t255 = mstmm_complex_times(B[46], t233);
+    const mstmm_complex t256 = mstmm_complex_plus(t254, t255);
+    const mstmm_complex t257 = mstmm_complex_plus(t10, t256);
+    z[1] = t257;
+    const mstmm_complex t258 = mstmm_complex_times(B[2], t143);
+    const mstmm_complex t259 = mstmm_complex_times(B[11], t161);
+    const mstmm_complex t260 = mstmm_complex_plus(t258, t259);
+    const mstmm_complex t261 = mstmm_complex_times(B[20], t179);
+    const mstmm_complex t262 = mstmm_complex_plus(t260, t261);
+    const mstmm_complex t263 = mstmm_complex_times(B[29], t197);
+    const mstmm_complex t264 = mstmm_complex_plus(t262, t263);
+    const mstmm_complex t265 = mstmm_complex_times(B[38], t215);
+    const mstmm_complex t266 = mstmm_complex_plus(t264, t265);
+    const mstmm_complex t267 = mstmm_complex_times(B[47], t233);
+    const mstmm_complex t268 = mstmm_complex_plus(t266, t267);
+    const mstmm_complex t269 = mstmm_complex_plus(t17, t268);
+    z[2] = t269;
+    const mstmm_complex t270 = mstmm_complex_times(B[3], t143);
+    const mstmm_complex t271 = mstmm_complex_times(B[12], t161);
+    const mstmm_complex t272 = mstmm_complex_plus(t270, t271);
+    const mstmm_complex t273 = mstmm_complex_times(B[21], t179);
+    const mstmm_complex t274 = mstmm_complex_plus(t272, t273);
+    const mstmm_complex t275 = mstmm_complex_times(B[30], t197);
+    const mstmm_complex t276 = mstmm_complex_plus(t274, t275);
+    const mstmm_complex t277 = mstmm_complex_times(B[39], t215);
+    const mstmm_complex t278 = mstmm_complex_plus(t276, t277);
+    const mstmm_complex t279 = mstmm_complex_times(B[48], t233);
+    const mstmm_complex t280 = mstmm_complex_plus(t278, t279);
+    const mstmm_complex t281 = mstmm_complex_plus(t28, t280);
+    z[3] = t281;
+    const mstmm_complex t282 = mstmm_complex_times(B[4], t143);
+    const mstmm_complex t283 = mstmm_complex_times(B[13], t161);
+    const mstmm_complex t284 = mstmm_complex_plus(t282, t283);
+    const mstmm_complex t285 = mstmm_complex_times(B[22], t179);
+    const mstmm_complex t286 = mstmm_complex_plus(t284, t285);
+    const mstmm_complex t287 = mstmm_complex_times(B[31], t197);
+    const mstmm_complex t288 = mstmm_complex_plus(t286, t287);
+    const mstmm_complex t289 = mstmm_complex_times(B[40], t215);
+    const mstmm_complex t290 = mstmm_complex_plus(t288, t289);
+    const mstmm_complex t291 = mstmm_complex_times(B[49], t233);
+    const mstmm_complex t292 = mstmm_complex_plus(t290, t291);
+    const mstmm_complex t293 = mstmm_complex_plus(t39, t292);
+    z[4] = t293;
+    const mstmm_complex t294 = mstmm_complex_times(B[5], t143);
+    const mstmm_complex t295 = mstmm_complex_times(B[14], t161);
+    const mstmm_complex t296 = mstmm_complex_plus(t294, t295);
+    const mstmm_complex t297 = mstmm_complex_times(B[23], t179);
+    const mstmm_complex t298 = mstmm_complex_plus(t296, t297);
+    const mstmm_complex t299 = mstmm_complex_times(B[32], t197);
+    const mstmm_complex t300 = mstmm_complex_plus(t298, t299);
+    const mstmm_complex t301 = mstmm_complex_times(B[41], t215);
+    const mstmm_complex t302 = mstmm_complex_plus(t300, t301);
+    const mstmm_complex t303 = mstmm_complex_times(B[50], t233);
+    const mstmm_complex t304 = mstmm_complex_plus(t302, t303);
+    const mstmm_complex t305 = mstmm_complex_plus(t50, t304);
+    z[5] = t305;
+    const mstmm_complex t306 = mstmm_complex_times(B[6], t143);
+    const mstmm_complex t307 = mstmm_complex_times(B[15], t161);
+    const mstmm_complex t308 = mstmm_complex_plus(t306, t307);
+    const mstmm_complex t309 = mstmm_complex_times(B[24], t179);
+    const mstmm_complex t310 = mstmm_complex_plus(t308, t309);
+    const mstmm_complex t311 = mstmm_complex_times(B[33], t197);
+    const mstmm_complex t312 = mstmm_complex_plus(t310, t311);
+    const mstmm_complex t313 = mstmm_complex_times(B[42], t215);
+    const mstmm_complex t314 = mstmm_complex_plus(t312, t313);
+    const mstmm_complex t315 = mstmm_complex_times(B[51], t233);
+    const mstmm_complex t316 = mstmm_complex_plus(t314, t315);
+    const mstmm_complex t317 = mstmm_complex_plus(t117, t316);
+    z[6] = t317;
+    const mstmm_complex t318 = mstmm_complex_times(B[7], t143);
+    const mstmm_complex t319 = mstmm_complex_times(B[16], t161);
+    const mstmm_complex t320 = mstmm_complex_plus(t318, t319);
+    const mstmm_complex t321 = mstmm_complex_times(B[25], t179);
+    const mstmm_complex t322 = mstmm_complex_plus(t320, t321);
+    const mstmm_complex t323 = mstmm_complex_times(B[34], t197);
+    const mstmm_complex t324 = mstmm_complex_plus(t322, t323);
+    const mstmm_complex t325 = mstmm_complex_times(B[43], t215);
+    const mstmm_complex t326 = mstmm_complex_plus(t324, t325);
+    const mstmm_complex t327 = mstmm_complex_times(B[52], t233);
+    const mstmm_complex t328 = mstmm_complex_plus(t326, t327);
+    const mstmm_complex t329 = mstmm_complex_plus(t129, t328);
+    z[7] = t329;
+    const mstmm_complex t330 = mstmm_complex_times(B[8], t143);
+    const mstmm_complex t331 = mstmm_complex_times(B[17], t161);
+    const mstmm_complex t332 = mstmm_complex_plus(t330, t331);
+    const mstmm_complex t333 = mstmm_complex_times(B[26], t179);
+    const mstmm_complex t334 = mstmm_complex_plus(t332, t333);
+    const mstmm_complex t335 = mstmm_complex_times(B[35], t197);
+    const mstmm_complex t336 = mstmm_complex_plus(t334, t335);
+    const mstmm_complex t337 = mstmm_complex_times(B[44], t215);
+    const mstmm_complex t338 = mstmm_complex_plus(t336, t337);
+    const mstmm_complex t339 = mstmm_complex_times(B[53], t233);
+    const mstmm_complex t340 = mstmm_complex_plus(t338, t339);
+    const mstmm_complex t341 = mstmm_complex_plus(t140, t340);
+    z[8] = t341;
+    return 0;
+}
+
 /* efforts on the modes
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
@@ -16064,10 +16064,10 @@ static int mstmm_complex_sweep_modal_modal_effort(int n, const double *restrict 
  * out Z_x[n][n], added to what is there
  */
 static inline __attribute__((always_inline))
-int mstmm_complex_sweep_tangent_absorb_sized(int n, const double *restrict Rc, const double *restrict r,
-    const double *restrict H, const mstmm_complex *restrict B, const mstmm_complex *restrict G,
-    const mstmm_complex *restrict W, const mstmm_complex *restrict S, const mstmm_complex *restrict T, mstmm_complex *restrict K_x,
-    mstmm_complex *restrict K, mstmm_complex *restrict Z_z, mstmm_complex *restrict Z_x)
+int mstmm_complex_sweep_tangent_assemble_port_sized(int n, const double *restrict Rc,
+    const double *restrict r, const double *restrict H, const mstmm_complex *restrict B,
+    const mstmm_complex *restrict G, const mstmm_complex *restrict W, const mstmm_complex *restrict S, const mstmm_complex *restrict T,
+    mstmm_complex *restrict K_x, mstmm_complex *restrict K, mstmm_complex *restrict Z_z, mstmm_complex *restrict Z_x)
 {
     for (int k = 0; k < n; ++k) {
         const mstmm_complex t0 = mstmm_complex_times(S[0], B[9 * k]);
@@ -16455,17 +16455,113 @@ int mstmm_complex_sweep_tangent_absorb_sized(int n, const double *restrict Rc, c
     return 0;
 }
 
-static int mstmm_complex_sweep_tangent_absorb(int n, const double *restrict Rc, const double *restrict r,
+static int mstmm_complex_sweep_tangent_assemble_port(int n, const double *restrict Rc, const double *restrict r,
     const double *restrict H, const mstmm_complex *restrict B, const mstmm_complex *restrict G,
     const mstmm_complex *restrict W, const mstmm_complex *restrict S, const mstmm_complex *restrict T, mstmm_complex *restrict K_x,
     mstmm_complex *restrict K, mstmm_complex *restrict Z_z, mstmm_complex *restrict Z_x)
 {
     switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_complex_sweep_tangent_absorb_sized(1, Rc, r, H, B, G, W, S, T, K_x, K, Z_z, Z_x);
-    case 2: return mstmm_complex_sweep_tangent_absorb_sized(2, Rc, r, H, B, G, W, S, T, K_x, K, Z_z, Z_x);
-    case 3: return mstmm_complex_sweep_tangent_absorb_sized(3, Rc, r, H, B, G, W, S, T, K_x, K, Z_z, Z_x);
-    case 4: return mstmm_complex_sweep_tangent_absorb_sized(4, Rc, r, H, B, G, W, S, T, K_x, K, Z_z, Z_x);
-    default: return mstmm_complex_sweep_tangent_absorb_sized(n, Rc, r, H, B, G, W, S, T, K_x, K, Z_z, Z_x);
+    case 1: return mstmm_complex_sweep_tangent_assemble_port_sized(1, Rc, r, H, B, G, W, S, T, K_x, K, Z_z, Z_x);
+    case 2: return mstmm_complex_sweep_tangent_assemble_port_sized(2, Rc, r, H, B, G, W, S, T, K_x, K, Z_z, Z_x);
+    case 3: return mstmm_complex_sweep_tangent_assemble_port_sized(3, Rc, r, H, B, G, W, S, T, K_x, K, Z_z, Z_x);
+    case 4: return mstmm_complex_sweep_tangent_assemble_port_sized(4, Rc, r, H, B, G, W, S, T, K_x, K, Z_z, Z_x);
+    default: return mstmm_complex_sweep_tangent_assemble_port_sized(n, Rc, r, H, B, G, W, S, T, K_x, K, Z_z, Z_x);
+    }
+}
+
+/* unknowns eliminated from a right-hand side
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  H[6][n] motion subspace of the unknowns
+ * in  V[6][n] K + G
+ * in  D[n][n] rows by unknowns
+ * in  e[6] (N, N*m) force part of f = S a + e, at P
+ * in  e_f[n] load of the rows
+ * out rest[n] the remainder of the rows
+ * out y[n] D^-1 times the remainder of the rows
+ * out e_c[6] (N, N*m) load without the unknowns
+ * out work[n][n] factor L, D of solve
+ */
+static inline __attribute__((always_inline))
+int mstmm_complex_sweep_tangent_column_load_sized(int n, const double *restrict H, const mstmm_complex *restrict V,
+    const mstmm_complex *restrict D, const mstmm_complex *restrict e, const mstmm_complex *restrict e_f, mstmm_complex *restrict rest,
+    mstmm_complex *restrict y, mstmm_complex *restrict e_c, mstmm_complex *restrict work)
+{
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t0 = mstmm_complex_scaled(H[k], e[0]);
+        const mstmm_complex t1 = mstmm_complex_scaled(H[n + k], e[1]);
+        const mstmm_complex t2 = mstmm_complex_plus(t0, t1);
+        const mstmm_complex t3 = mstmm_complex_scaled(H[2 * n + k], e[2]);
+        const mstmm_complex t4 = mstmm_complex_plus(t2, t3);
+        const mstmm_complex t5 = mstmm_complex_scaled(H[3 * n + k], e[3]);
+        const mstmm_complex t6 = mstmm_complex_plus(t4, t5);
+        const mstmm_complex t7 = mstmm_complex_scaled(H[4 * n + k], e[4]);
+        const mstmm_complex t8 = mstmm_complex_plus(t6, t7);
+        const mstmm_complex t9 = mstmm_complex_scaled(H[5 * n + k], e[5]);
+        const mstmm_complex t10 = mstmm_complex_plus(t8, t9);
+        const mstmm_complex t11 = mstmm_complex_plus(e_f[k], t10);
+        const mstmm_complex t12 = mstmm_complex_scaled(-1, t11);
+        rest[k] = t12;
+    }
+    /* a pivot of D vanishes: a motion is undetermined */
+    const int found_y = mstmm_complex_solve_lu(n, 1, D, rest, y, work, 1e-13);
+    if (found_y == 1) return 1;
+    mstmm_complex t14 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t13 = mstmm_complex_times(V[k], y[k]);
+        t14 = mstmm_complex_plus(t14, t13);
+    }
+    const mstmm_complex t15 = mstmm_complex_plus(e[0], t14);
+    e_c[0] = t15;
+    mstmm_complex t17 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t16 = mstmm_complex_times(y[k], V[n + k]);
+        t17 = mstmm_complex_plus(t17, t16);
+    }
+    const mstmm_complex t18 = mstmm_complex_plus(e[1], t17);
+    e_c[1] = t18;
+    mstmm_complex t20 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t19 = mstmm_complex_times(y[k], V[2 * n + k]);
+        t20 = mstmm_complex_plus(t20, t19);
+    }
+    const mstmm_complex t21 = mstmm_complex_plus(e[2], t20);
+    e_c[2] = t21;
+    mstmm_complex t23 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t22 = mstmm_complex_times(y[k], V[3 * n + k]);
+        t23 = mstmm_complex_plus(t23, t22);
+    }
+    const mstmm_complex t24 = mstmm_complex_plus(e[3], t23);
+    e_c[3] = t24;
+    mstmm_complex t26 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t25 = mstmm_complex_times(y[k], V[4 * n + k]);
+        t26 = mstmm_complex_plus(t26, t25);
+    }
+    const mstmm_complex t27 = mstmm_complex_plus(e[4], t26);
+    e_c[4] = t27;
+    mstmm_complex t29 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t28 = mstmm_complex_times(y[k], V[5 * n + k]);
+        t29 = mstmm_complex_plus(t29, t28);
+    }
+    const mstmm_complex t30 = mstmm_complex_plus(e[5], t29);
+    e_c[5] = t30;
+    if (found_y) return 2; /* a negative determinant */
+    return 0;
+}
+
+static int mstmm_complex_sweep_tangent_column_load(int n, const double *restrict H, const mstmm_complex *restrict V,
+    const mstmm_complex *restrict D, const mstmm_complex *restrict e, const mstmm_complex *restrict e_f, mstmm_complex *restrict rest,
+    mstmm_complex *restrict y, mstmm_complex *restrict e_c, mstmm_complex *restrict work)
+{
+    switch (n) { /* loops over a known number are unrolled */
+    case 1: return mstmm_complex_sweep_tangent_column_load_sized(1, H, V, D, e, e_f, rest, y, e_c, work);
+    case 2: return mstmm_complex_sweep_tangent_column_load_sized(2, H, V, D, e, e_f, rest, y, e_c, work);
+    case 3: return mstmm_complex_sweep_tangent_column_load_sized(3, H, V, D, e, e_f, rest, y, e_c, work);
+    case 4: return mstmm_complex_sweep_tangent_column_load_sized(4, H, V, D, e, e_f, rest, y, e_c, work);
+    default: return mstmm_complex_sweep_tangent_column_load_sized(n, H, V, D, e, e_f, rest, y, e_c, work);
     }
 }
 
@@ -16480,8 +16576,9 @@ static int mstmm_complex_sweep_tangent_absorb(int n, const double *restrict Rc, 
  * out z[9] change of the body's motion, own axes
  */
 static inline __attribute__((always_inline))
-int mstmm_complex_sweep_tangent_answer_sized(int n, const mstmm_complex *restrict B, const mstmm_complex *restrict gain,
-    const mstmm_complex *restrict y, const mstmm_complex *restrict z_c, mstmm_complex *restrict x, mstmm_complex *restrict z)
+int mstmm_complex_sweep_tangent_column_solution_sized(int n, const mstmm_complex *restrict B,
+    const mstmm_complex *restrict gain, const mstmm_complex *restrict y, const mstmm_complex *restrict z_c, mstmm_complex *restrict x,
+    mstmm_complex *restrict z)
 {
     for (int k = 0; k < n; ++k) {
         const mstmm_complex t0 = mstmm_complex_times(z_c[0], gain[9 * k]);
@@ -16570,105 +16667,15 @@ int mstmm_complex_sweep_tangent_answer_sized(int n, const mstmm_complex *restric
     return 0;
 }
 
-static int mstmm_complex_sweep_tangent_answer(int n, const mstmm_complex *restrict B, const mstmm_complex *restrict gain,
+static int mstmm_complex_sweep_tangent_column_solution(int n, const mstmm_complex *restrict B, const mstmm_complex *restrict gain,
     const mstmm_complex *restrict y, const mstmm_complex *restrict z_c, mstmm_complex *restrict x, mstmm_complex *restrict z)
 {
     switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_complex_sweep_tangent_answer_sized(1, B, gain, y, z_c, x, z);
-    case 2: return mstmm_complex_sweep_tangent_answer_sized(2, B, gain, y, z_c, x, z);
-    case 3: return mstmm_complex_sweep_tangent_answer_sized(3, B, gain, y, z_c, x, z);
-    case 4: return mstmm_complex_sweep_tangent_answer_sized(4, B, gain, y, z_c, x, z);
-    default: return mstmm_complex_sweep_tangent_answer_sized(n, B, gain, y, z_c, x, z);
-    }
-}
-
-/* change of motion with the unknowns' part
- * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
- * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  B[n][9] motion along the unknowns
- * in  x[n] unknowns
- * in  z_c[9] change of motion without the unknowns' part
- * out z[9] change of the body's motion, own axes
- */
-static inline __attribute__((always_inline))
-int mstmm_complex_sweep_tangent_displaced_sized(int n, const mstmm_complex *restrict B, const mstmm_complex *restrict x,
-    const mstmm_complex *restrict z_c, mstmm_complex *restrict z)
-{
-    mstmm_complex t1 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t0 = mstmm_complex_times(B[9 * k], x[k]);
-        t1 = mstmm_complex_plus(t1, t0);
-    }
-    const mstmm_complex t2 = mstmm_complex_plus(z_c[0], t1);
-    z[0] = t2;
-    mstmm_complex t4 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t3 = mstmm_complex_times(x[k], B[9 * k + 1]);
-        t4 = mstmm_complex_plus(t4, t3);
-    }
-    const mstmm_complex t5 = mstmm_complex_plus(z_c[1], t4);
-    z[1] = t5;
-    mstmm_complex t7 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t6 = mstmm_complex_times(x[k], B[9 * k + 2]);
-        t7 = mstmm_complex_plus(t7, t6);
-    }
-    const mstmm_complex t8 = mstmm_complex_plus(z_c[2], t7);
-    z[2] = t8;
-    mstmm_complex t10 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t9 = mstmm_complex_times(x[k], B[9 * k + 3]);
-        t10 = mstmm_complex_plus(t10, t9);
-    }
-    const mstmm_complex t11 = mstmm_complex_plus(z_c[3], t10);
-    z[3] = t11;
-    mstmm_complex t13 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t12 = mstmm_complex_times(x[k], B[9 * k + 4]);
-        t13 = mstmm_complex_plus(t13, t12);
-    }
-    const mstmm_complex t14 = mstmm_complex_plus(z_c[4], t13);
-    z[4] = t14;
-    mstmm_complex t16 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t15 = mstmm_complex_times(x[k], B[9 * k + 5]);
-        t16 = mstmm_complex_plus(t16, t15);
-    }
-    const mstmm_complex t17 = mstmm_complex_plus(z_c[5], t16);
-    z[5] = t17;
-    mstmm_complex t19 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t18 = mstmm_complex_times(x[k], B[9 * k + 6]);
-        t19 = mstmm_complex_plus(t19, t18);
-    }
-    const mstmm_complex t20 = mstmm_complex_plus(z_c[6], t19);
-    z[6] = t20;
-    mstmm_complex t22 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t21 = mstmm_complex_times(x[k], B[9 * k + 7]);
-        t22 = mstmm_complex_plus(t22, t21);
-    }
-    const mstmm_complex t23 = mstmm_complex_plus(z_c[7], t22);
-    z[7] = t23;
-    mstmm_complex t25 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t24 = mstmm_complex_times(x[k], B[9 * k + 8]);
-        t25 = mstmm_complex_plus(t25, t24);
-    }
-    const mstmm_complex t26 = mstmm_complex_plus(z_c[8], t25);
-    z[8] = t26;
-    return 0;
-}
-
-static int mstmm_complex_sweep_tangent_displaced(int n, const mstmm_complex *restrict B, const mstmm_complex *restrict x,
-    const mstmm_complex *restrict z_c, mstmm_complex *restrict z)
-{
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_complex_sweep_tangent_displaced_sized(1, B, x, z_c, z);
-    case 2: return mstmm_complex_sweep_tangent_displaced_sized(2, B, x, z_c, z);
-    case 3: return mstmm_complex_sweep_tangent_displaced_sized(3, B, x, z_c, z);
-    case 4: return mstmm_complex_sweep_tangent_displaced_sized(4, B, x, z_c, z);
-    default: return mstmm_complex_sweep_tangent_displaced_sized(n, B, x, z_c, z);
+    case 1: return mstmm_complex_sweep_tangent_column_solution_sized(1, B, gain, y, z_c, x, z);
+    case 2: return mstmm_complex_sweep_tangent_column_solution_sized(2, B, gain, y, z_c, x, z);
+    case 3: return mstmm_complex_sweep_tangent_column_solution_sized(3, B, gain, y, z_c, x, z);
+    case 4: return mstmm_complex_sweep_tangent_column_solution_sized(4, B, gain, y, z_c, x, z);
+    default: return mstmm_complex_sweep_tangent_column_solution_sized(n, B, gain, y, z_c, x, z);
     }
 }
 
@@ -17535,6 +17542,727 @@ static int mstmm_complex_sweep_tangent_node(int n, const double *restrict H, con
     }
 }
 
+/* unknowns of a flexible body eliminated from loads by the pose
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  H[6][n] motion subspace of the unknowns
+ * in  V[6][n] K + G
+ * in  D[n][n] rows by unknowns
+ * in  S_p[9][6] change of the load by the pose, one row per entry
+ * in  Z_p[9][n] own rows by the pose, one row per entry
+ * out right[n][9] rows by the pose
+ * out gain[n][9] D^-1 times the rows by the pose
+ * out S_c[9][6] S_p without the unknowns, one row per entry
+ * out work[n][n] factor L, D of solve
+ */
+static inline __attribute__((always_inline))
+int mstmm_complex_sweep_tangent_placed_node_sized(int n, const double *restrict H, const mstmm_complex *restrict V,
+    const mstmm_complex *restrict D, const mstmm_complex *restrict S_p, const mstmm_complex *restrict Z_p,
+    mstmm_complex *restrict right, mstmm_complex *restrict gain, mstmm_complex *restrict S_c, mstmm_complex *restrict work)
+{
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t0 = mstmm_complex_scaled(H[k], S_p[0]);
+        const mstmm_complex t1 = mstmm_complex_scaled(H[n + k], S_p[1]);
+        const mstmm_complex t2 = mstmm_complex_plus(t0, t1);
+        const mstmm_complex t3 = mstmm_complex_scaled(H[2 * n + k], S_p[2]);
+        const mstmm_complex t4 = mstmm_complex_plus(t2, t3);
+        const mstmm_complex t5 = mstmm_complex_scaled(H[3 * n + k], S_p[3]);
+        const mstmm_complex t6 = mstmm_complex_plus(t4, t5);
+        const mstmm_complex t7 = mstmm_complex_scaled(H[4 * n + k], S_p[4]);
+        const mstmm_complex t8 = mstmm_complex_plus(t6, t7);
+        const mstmm_complex t9 = mstmm_complex_scaled(H[5 * n + k], S_p[5]);
+        const mstmm_complex t10 = mstmm_complex_plus(t8, t9);
+        const mstmm_complex t11 = mstmm_complex_plus(t10, Z_p[k]);
+        right[9 * k] = t11;
+    }
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t12 = mstmm_complex_scaled(H[k], S_p[6]);
+        const mstmm_complex t13 = mstmm_complex_scaled(H[n + k], S_p[7]);
+        const mstmm_complex t14 = mstmm_complex_plus(t12, t13);
+        const mstmm_complex t15 = mstmm_complex_scaled(H[2 * n + k], S_p[8]);
+        const mstmm_complex t16 = mstmm_complex_plus(t14, t15);
+        const mstmm_complex t17 = mstmm_complex_scaled(H[3 * n + k], S_p[9]);
+        const mstmm_complex t18 = mstmm_complex_plus(t16, t17);
+        const mstmm_complex t19 = mstmm_complex_scaled(H[4 * n + k], S_p[10]);
+        const mstmm_complex t20 = mstmm_complex_plus(t18, t19);
+        const mstmm_complex t21 = mstmm_complex_scaled(H[5 * n + k], S_p[11]);
+        const mstmm_complex t22 = mstmm_complex_plus(t20, t21);
+        const mstmm_complex t23 = mstmm_complex_plus(t22, Z_p[n + k]);
+        right[9 * k + 1] = t23;
+    }
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t24 = mstmm_complex_scaled(H[k], S_p[12]);
+        const mstmm_complex t25 = mstmm_complex_scaled(H[n + k], S_p[13]);
+        const mstmm_complex t26 = mstmm_complex_plus(t24, t25);
+        const mstmm_complex t27 = mstmm_complex_scaled(H[2 * n + k], S_p[14]);
+        const mstmm_complex t28 = mstmm_complex_plus(t26, t27);
+        const mstmm_complex t29 = mstmm_complex_scaled(H[3 * n + k], S_p[15]);
+        const mstmm_complex t30 = mstmm_complex_plus(t28, t29);
+        const mstmm_complex t31 = mstmm_complex_scaled(H[4 * n + k], S_p[16]);
+        const mstmm_complex t32 = mstmm_complex_plus(t30, t31);
+        const mstmm_complex t33 = mstmm_complex_scaled(H[5 * n + k], S_p[17]);
+        const mstmm_complex t34 = mstmm_complex_plus(t32, t33);
+        const mstmm_complex t35 = mstmm_complex_plus(t34, Z_p[2 * n + k]);
+        right[9 * k + 2] = t35;
+    }
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t36 = mstmm_complex_scaled(H[k], S_p[18]);
+        const mstmm_complex t37 = mstmm_complex_scaled(H[n + k], S_p[19]);
+        const mstmm_complex t38 = mstmm_complex_plus(t36, t37);
+        const mstmm_complex t39 = mstmm_complex_scaled(H[2 * n + k], S_p[20]);
+        const mstmm_complex t40 = mstmm_complex_plus(t38, t39);
+        const mstmm_complex t41 = mstmm_complex_scaled(H[3 * n + k], S_p[21]);
+        const mstmm_complex t42 = mstmm_complex_plus(t40, t41);
+        const mstmm_complex t43 = mstmm_complex_scaled(H[4 * n + k], S_p[22]);
+        const mstmm_complex t44 = mstmm_complex_plus(t42, t43);
+        const mstmm_complex t45 = mstmm_complex_scaled(H[5 * n + k], S_p[23]);
+        const mstmm_complex t46 = mstmm_complex_plus(t44, t45);
+        const mstmm_complex t47 = mstmm_complex_plus(t46, Z_p[3 * n + k]);
+        right[9 * k + 3] = t47;
+    }
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t48 = mstmm_complex_scaled(H[k], S_p[24]);
+        const mstmm_complex t49 = mstmm_complex_scaled(H[n + k], S_p[25]);
+        const mstmm_complex t50 = mstmm_complex_plus(t48, t49);
+        const mstmm_complex t51 = mstmm_complex_scaled(H[2 * n + k], S_p[26]);
+        const mstmm_complex t52 = mstmm_complex_plus(t50, t51);
+        const mstmm_complex t53 = mstmm_complex_scaled(H[3 * n + k], S_p[27]);
+        const mstmm_complex t54 = mstmm_complex_plus(t52, t53);
+        const mstmm_complex t55 = mstmm_complex_scaled(H[4 * n + k], S_p[28]);
+        const mstmm_complex t56 = mstmm_complex_plus(t54, t55);
+        const mstmm_complex t57 = mstmm_complex_scaled(H[5 * n + k], S_p[29]);
+        const mstmm_complex t58 = mstmm_complex_plus(t56, t57);
+        const mstmm_complex t59 = mstmm_complex_plus(t58, Z_p[4 * n + k]);
+        right[9 * k + 4] = t59;
+    }
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t60 = mstmm_complex_scaled(H[k], S_p[30]);
+        const mstmm_complex t61 = mstmm_complex_scaled(H[n + k], S_p[31]);
+        const mstmm_complex t62 = mstmm_complex_plus(t60, t61);
+        const mstmm_complex t63 = mstmm_complex_scaled(H[2 * n + k], S_p[32]);
+        const mstmm_complex t64 = mstmm_complex_plus(t62, t63);
+        const mstmm_complex t65 = mstmm_complex_scaled(H[3 * n + k], S_p[33]);
+        const mstmm_complex t66 = mstmm_complex_plus(t64, t65);
+        const mstmm_complex t67 = mstmm_complex_scaled(H[4 * n + k], S_p[34]);
+        const mstmm_complex t68 = mstmm_complex_plus(t66, t67);
+        const mstmm_complex t69 = mstmm_complex_scaled(H[5 * n + k], S_p[35]);
+        const mstmm_complex t70 = mstmm_complex_plus(t68, t69);
+        const mstmm_complex t71 = mstmm_complex_plus(t70, Z_p[5 * n + k]);
+        right[9 * k + 5] = t71;
+    }
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t72 = mstmm_complex_scaled(H[k], S_p[36]);
+        const mstmm_complex t73 = mstmm_complex_scaled(H[n + k], S_p[37]);
+        const mstmm_complex t74 = mstmm_complex_plus(t72, t73);
+        const mstmm_complex t75 = mstmm_complex_scaled(H[2 * n + k], S_p[38]);
+        const mstmm_complex t76 = mstmm_complex_plus(t74, t75);
+        const mstmm_complex t77 = mstmm_complex_scaled(H[3 * n + k], S_p[39]);
+        const mstmm_complex t78 = mstmm_complex_plus(t76, t77);
+        const mstmm_complex t79 = mstmm_complex_scaled(H[4 * n + k], S_p[40]);
+        const mstmm_complex t80 = mstmm_complex_plus(t78, t79);
+        const mstmm_complex t81 = mstmm_complex_scaled(H[5 * n + k], S_p[41]);
+        const mstmm_complex t82 = mstmm_complex_plus(t80, t81);
+        const mstmm_complex t83 = mstmm_complex_plus(t82, Z_p[6 * n + k]);
+        right[9 * k + 6] = t83;
+    }
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t84 = mstmm_complex_scaled(H[k], S_p[42]);
+        const mstmm_complex t85 = mstmm_complex_scaled(H[n + k], S_p[43]);
+        const mstmm_complex t86 = mstmm_complex_plus(t84, t85);
+        const mstmm_complex t87 = mstmm_complex_scaled(H[2 * n + k], S_p[44]);
+        const mstmm_complex t88 = mstmm_complex_plus(t86, t87);
+        const mstmm_complex t89 = mstmm_complex_scaled(H[3 * n + k], S_p[45]);
+        const mstmm_complex t90 = mstmm_complex_plus(t88, t89);
+        const mstmm_complex t91 = mstmm_complex_scaled(H[4 * n + k], S_p[46]);
+        const mstmm_complex t92 = mstmm_complex_plus(t90, t91);
+        const mstmm_complex t93 = mstmm_complex_scaled(H[5 * n + k], S_p[47]);
+        const mstmm_complex t94 = mstmm_complex_plus(t92, t93);
+        const mstmm_complex t95 = mstmm_complex_plus(t94, Z_p[7 * n + k]);
+        right[9 * k + 7] = t95;
+    }
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t96 = mstmm_complex_scaled(H[k], S_p[48]);
+        const mstmm_complex t97 = mstmm_complex_scaled(H[n + k], S_p[49]);
+        const mstmm_complex t98 = mstmm_complex_plus(t96, t97);
+        const mstmm_complex t99 = mstmm_complex_scaled(H[2 * n + k], S_p[50]);
+        const mstmm_complex t100 = mstmm_complex_plus(t98, t99);
+        const mstmm_complex t101 = mstmm_complex_scaled(H[3 * n + k], S_p[51]);
+        const mstmm_complex t102 = mstmm_complex_plus(t100, t101);
+        const mstmm_complex t103 = mstmm_complex_scaled(H[4 * n + k], S_p[52]);
+        const mstmm_complex t104 = mstmm_complex_plus(t102, t103);
+        const mstmm_complex t105 = mstmm_complex_scaled(H[5 * n + k], S_p[53]);
+        const mstmm_complex t106 = mstmm_complex_plus(t104, t105);
+        const mstmm_complex t107 = mstmm_complex_plus(t106, Z_p[8 * n + k]);
+        right[9 * k + 8] = t107;
+    }
+    /* a pivot of D vanishes: a motion is undetermined */
+    const int found_gain = mstmm_complex_solve_lu(n, 9, D, right, gain, work, 1e-13);
+    if (found_gain == 1) return 1;
+    mstmm_complex t109 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t108 = mstmm_complex_times(gain[9 * k], V[k]);
+        t109 = mstmm_complex_plus(t109, t108);
+    }
+    const mstmm_complex t110 = mstmm_complex_minus(S_p[0], t109);
+    S_c[0] = t110;
+    mstmm_complex t112 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t111 = mstmm_complex_times(gain[9 * k], V[n + k]);
+        t112 = mstmm_complex_plus(t112, t111);
+    }
+    const mstmm_complex t113 = mstmm_complex_minus(S_p[1], t112);
+    S_c[1] = t113;
+    mstmm_complex t115 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t114 = mstmm_complex_times(gain[9 * k], V[2 * n + k]);
+        t115 = mstmm_complex_plus(t115, t114);
+    }
+    const mstmm_complex t116 = mstmm_complex_minus(S_p[2], t115);
+    S_c[2] = t116;
+    mstmm_complex t118 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t117 = mstmm_complex_times(gain[9 * k], V[3 * n + k]);
+        t118 = mstmm_complex_plus(t118, t117);
+    }
+    const mstmm_complex t119 = mstmm_complex_minus(S_p[3], t118);
+    S_c[3] = t119;
+    mstmm_complex t121 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t120 = mstmm_complex_times(gain[9 * k], V[4 * n + k]);
+        t121 = mstmm_complex_plus(t121, t120);
+    }
+    const mstmm_complex t122 = mstmm_complex_minus(S_p[4], t121);
+    S_c[4] = t122;
+    mstmm_complex t124 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t123 = mstmm_complex_times(gain[9 * k], V[5 * n + k]);
+        t124 = mstmm_complex_plus(t124, t123);
+    }
+    const mstmm_complex t125 = mstmm_complex_minus(S_p[5], t124);
+    S_c[5] = t125;
+    mstmm_complex t127 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t126 = mstmm_complex_times(V[k], gain[9 * k + 1]);
+        t127 = mstmm_complex_plus(t127, t126);
+    }
+    const mstmm_complex t128 = mstmm_complex_minus(S_p[6], t127);
+    S_c[6] = t128;
+    mstmm_complex t130 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t129 = mstmm_complex_times(V[n + k], gain[9 * k + 1]);
+        t130 = mstmm_complex_plus(t130, t129);
+    }
+    const mstmm_complex t131 = mstmm_complex_minus(S_p[7], t130);
+    S_c[7] = t131;
+    mstmm_complex t133 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t132 = mstmm_complex_times(V[2 * n + k], gain[9 * k + 1]);
+        t133 = mstmm_complex_plus(t133, t132);
+    }
+    const mstmm_complex t134 = mstmm_complex_minus(S_p[8], t133);
+    S_c[8] = t134;
+    mstmm_complex t136 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t135 = mstmm_complex_times(V[3 * n + k], gain[9 * k + 1]);
+        t136 = mstmm_complex_plus(t136, t135);
+    }
+    const mstmm_complex t137 = mstmm_complex_minus(S_p[9], t136);
+    S_c[9] = t137;
+    mstmm_complex t139 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t138 = mstmm_complex_times(V[4 * n + k], gain[9 * k + 1]);
+        t139 = mstmm_complex_plus(t139, t138);
+    }
+    const mstmm_complex t140 = mstmm_complex_minus(S_p[10], t139);
+    S_c[10] = t140;
+    mstmm_complex t142 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t141 = mstmm_complex_times(V[5 * n + k], gain[9 * k + 1]);
+        t142 = mstmm_complex_plus(t142, t141);
+    }
+    const mstmm_complex t143 = mstmm_complex_minus(S_p[11], t142);
+    S_c[11] = t143;
+    mstmm_complex t145 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t144 = mstmm_complex_times(V[k], gain[9 * k + 2]);
+        t145 = mstmm_complex_plus(t145, t144);
+    }
+    const mstmm_complex t146 = mstmm_complex_minus(S_p[12], t145);
+    S_c[12] = t146;
+    mstmm_complex t148 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t147 = mstmm_complex_times(V[n + k], gain[9 * k + 2]);
+        t148 = mstmm_complex_plus(t148, t147);
+    }
+    const mstmm_complex t149 = mstmm_complex_minus(S_p[13], t148);
+    S_c[13] = t149;
+    mstmm_complex t151 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t150 = mstmm_complex_times(V[2 * n + k], gain[9 * k + 2]);
+        t151 = mstmm_complex_plus(t151, t150);
+    }
+    const mstmm_complex t152 = mstmm_complex_minus(S_p[14], t151);
+    S_c[14] = t152;
+    mstmm_complex t154 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t153 = mstmm_complex_times(V[3 * n + k], gain[9 * k + 2]);
+        t154 = mstmm_complex_plus(t154, t153);
+    }
+    const mstmm_complex t155 = mstmm_complex_minus(S_p[15], t154);
+    S_c[15] = t155;
+    mstmm_complex t157 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t156 = mstmm_complex_times(V[4 * n + k], gain[9 * k + 2]);
+        t157 = mstmm_complex_plus(t157, t156);
+    }
+    const mstmm_complex t158 = mstmm_complex_minus(S_p[16], t157);
+    S_c[16] = t158;
+    mstmm_complex t160 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t159 = mstmm_complex_times(V[5 * n + k], gain[9 * k + 2]);
+        t160 = mstmm_complex_plus(t160, t159);
+    }
+    const mstmm_complex t161 = mstmm_complex_minus(S_p[17], t160);
+    S_c[17] = t161;
+    mstmm_complex t163 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t162 = mstmm_complex_times(V[k], gain[9 * k + 3]);
+        t163 = mstmm_complex_plus(t163, t162);
+    }
+    const mstmm_complex t164 = mstmm_complex_minus(S_p[18], t163);
+    S_c[18] = t164;
+    mstmm_complex t166 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t165 = mstmm_complex_times(V[n + k], gain[9 * k + 3]);
+        t166 = mstmm_complex_plus(t166, t165);
+    }
+    const mstmm_complex t167 = mstmm_complex_minus(S_p[19], t166);
+    S_c[19] = t167;
+    mstmm_complex t169 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t168 = mstmm_complex_times(V[2 * n + k], gain[9 * k + 3]);
+        t169 = mstmm_complex_plus(t169, t168);
+    }
+    const mstmm_complex t170 = mstmm_complex_minus(S_p[20], t169);
+    S_c[20] = t170;
+    mstmm_complex t172 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t171 = mstmm_complex_times(V[3 * n + k], gain[9 * k + 3]);
+        t172 = mstmm_complex_plus(t172, t171);
+    }
+    const mstmm_complex t173 = mstmm_complex_minus(S_p[21], t172);
+    S_c[21] = t173;
+    mstmm_complex t175 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t174 = mstmm_complex_times(V[4 * n + k], gain[9 * k + 3]);
+        t175 = mstmm_complex_plus(t175, t174);
+    }
+    const mstmm_complex t176 = mstmm_complex_minus(S_p[22], t175);
+    S_c[22] = t176;
+    mstmm_complex t178 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t177 = mstmm_complex_times(V[5 * n + k], gain[9 * k + 3]);
+        t178 = mstmm_complex_plus(t178, t177);
+    }
+    const mstmm_complex t179 = mstmm_complex_minus(S_p[23], t178);
+    S_c[23] = t179;
+    mstmm_complex t181 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t180 = mstmm_complex_times(V[k], gain[9 * k + 4]);
+        t181 = mstmm_complex_plus(t181, t180);
+    }
+    const mstmm_complex t182 = mstmm_complex_minus(S_p[24], t181);
+    S_c[24] = t182;
+    mstmm_complex t184 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t183 = mstmm_complex_times(V[n + k], gain[9 * k + 4]);
+        t184 = mstmm_complex_plus(t184, t183);
+    }
+    const mstmm_complex t185 = mstmm_complex_minus(S_p[25], t184);
+    S_c[25] = t185;
+    mstmm_complex t187 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t186 = mstmm_complex_times(V[2 * n + k], gain[9 * k + 4]);
+        t187 = mstmm_complex_plus(t187, t186);
+    }
+    const mstmm_complex t188 = mstmm_complex_minus(S_p[26], t187);
+    S_c[26] = t188;
+    mstmm_complex t190 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t189 = mstmm_complex_times(V[3 * n + k], gain[9 * k + 4]);
+        t190 = mstmm_complex_plus(t190, t189);
+    }
+    const mstmm_complex t191 = mstmm_complex_minus(S_p[27], t190);
+    S_c[27] = t191;
+    mstmm_complex t193 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t192 = mstmm_complex_times(V[4 * n + k], gain[9 * k + 4]);
+        t193 = mstmm_complex_plus(t193, t192);
+    }
+    const mstmm_complex t194 = mstmm_complex_minus(S_p[28], t193);
+    S_c[28] = t194;
+    mstmm_complex t196 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t195 = mstmm_complex_times(V[5 * n + k], gain[9 * k + 4]);
+        t196 = mstmm_complex_plus(t196, t195);
+    }
+    const mstmm_complex t197 = mstmm_complex_minus(S_p[29], t196);
+    S_c[29] = t197;
+    mstmm_complex t199 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t198 = mstmm_complex_times(V[k], gain[9 * k + 5]);
+        t199 = mstmm_complex_plus(t199, t198);
+    }
+    const mstmm_complex t200 = mstmm_complex_minus(S_p[30], t199);
+    S_c[30] = t200;
+    mstmm_complex t202 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t201 = mstmm_complex_times(V[n + k], gain[9 * k + 5]);
+        t202 = mstmm_complex_plus(t202, t201);
+    }
+    const mstmm_complex t203 = mstmm_complex_minus(S_p[31], t202);
+    S_c[31] = t203;
+    mstmm_complex t205 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t204 = mstmm_complex_times(V[2 * n + k], gain[9 * k + 5]);
+        t205 = mstmm_complex_plus(t205, t204);
+    }
+    const mstmm_complex t206 = mstmm_complex_minus(S_p[32], t205);
+    S_c[32] = t206;
+    mstmm_complex t208 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t207 = mstmm_complex_times(V[3 * n + k], gain[9 * k + 5]);
+        t208 = mstmm_complex_plus(t208, t207);
+    }
+    const mstmm_complex t209 = mstmm_complex_minus(S_p[33], t208);
+    S_c[33] = t209;
+    mstmm_complex t211 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t210 = mstmm_complex_times(V[4 * n + k], gain[9 * k + 5]);
+        t211 = mstmm_complex_plus(t211, t210);
+    }
+    const mstmm_complex t212 = mstmm_complex_minus(S_p[34], t211);
+    S_c[34] = t212;
+    mstmm_complex t214 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t213 = mstmm_complex_times(V[5 * n + k], gain[9 * k + 5]);
+        t214 = mstmm_complex_plus(t214, t213);
+    }
+    const mstmm_complex t215 = mstmm_complex_minus(S_p[35], t214);
+    S_c[35] = t215;
+    mstmm_complex t217 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t216 = mstmm_complex_times(V[k], gain[9 * k + 6]);
+        t217 = mstmm_complex_plus(t217, t216);
+    }
+    const mstmm_complex t218 = mstmm_complex_minus(S_p[36], t217);
+    S_c[36] = t218;
+    mstmm_complex t220 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t219 = mstmm_complex_times(V[n + k], gain[9 * k + 6]);
+        t220 = mstmm_complex_plus(t220, t219);
+    }
+    const mstmm_complex t221 = mstmm_complex_minus(S_p[37], t220);
+    S_c[37] = t221;
+    mstmm_complex t223 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t222 = mstmm_complex_times(V[2 * n + k], gain[9 * k + 6]);
+        t223 = mstmm_complex_plus(t223, t222);
+    }
+    const mstmm_complex t224 = mstmm_complex_minus(S_p[38], t223);
+    S_c[38] = t224;
+    mstmm_complex t226 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t225 = mstmm_complex_times(V[3 * n + k], gain[9 * k + 6]);
+        t226 = mstmm_complex_plus(t226, t225);
+    }
+    const mstmm_complex t227 = mstmm_complex_minus(S_p[39], t226);
+    S_c[39] = t227;
+    mstmm_complex t229 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t228 = mstmm_complex_times(V[4 * n + k], gain[9 * k + 6]);
+        t229 = mstmm_complex_plus(t229, t228);
+    }
+    const mstmm_complex t230 = mstmm_complex_minus(S_p[40], t229);
+    S_c[40] = t230;
+    mstmm_complex t232 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t231 = mstmm_complex_times(V[5 * n + k], gain[9 * k + 6]);
+        t232 = mstmm_complex_plus(t232, t231);
+    }
+    const mstmm_complex t233 = mstmm_complex_minus(S_p[41], t232);
+    S_c[41] = t233;
+    mstmm_complex t235 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t234 = mstmm_complex_times(V[k], gain[9 * k + 7]);
+        t235 = mstmm_complex_plus(t235, t234);
+    }
+    const mstmm_complex t236 = mstmm_complex_minus(S_p[42], t235);
+    S_c[42] = t236;
+    mstmm_complex t238 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t237 = mstmm_complex_times(V[n + k], gain[9 * k + 7]);
+        t238 = mstmm_complex_plus(t238, t237);
+    }
+    const mstmm_complex t239 = mstmm_complex_minus(S_p[43], t238);
+    S_c[43] = t239;
+    mstmm_complex t241 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t240 = mstmm_complex_times(V[2 * n + k], gain[9 * k + 7]);
+        t241 = mstmm_complex_plus(t241, t240);
+    }
+    const mstmm_complex t242 = mstmm_complex_minus(S_p[44], t241);
+    S_c[44] = t242;
+    mstmm_complex t244 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t243 = mstmm_complex_times(V[3 * n + k], gain[9 * k + 7]);
+        t244 = mstmm_complex_plus(t244, t243);
+    }
+    const mstmm_complex t245 = mstmm_complex_minus(S_p[45], t244);
+    S_c[45] = t245;
+    mstmm_complex t247 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t246 = mstmm_complex_times(V[4 * n + k], gain[9 * k + 7]);
+        t247 = mstmm_complex_plus(t247, t246);
+    }
+    const mstmm_complex t248 = mstmm_complex_minus(S_p[46], t247);
+    S_c[46] = t248;
+    mstmm_complex t250 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t249 = mstmm_complex_times(V[5 * n + k], gain[9 * k + 7]);
+        t250 = mstmm_complex_plus(t250, t249);
+    }
+    const mstmm_complex t251 = mstmm_complex_minus(S_p[47], t250);
+    S_c[47] = t251;
+    mstmm_complex t253 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t252 = mstmm_complex_times(V[k], gain[9 * k + 8]);
+        t253 = mstmm_complex_plus(t253, t252);
+    }
+    const mstmm_complex t254 = mstmm_complex_minus(S_p[48], t253);
+    S_c[48] = t254;
+    mstmm_complex t256 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t255 = mstmm_complex_times(V[n + k], gain[9 * k + 8]);
+        t256 = mstmm_complex_plus(t256, t255);
+    }
+    const mstmm_complex t257 = mstmm_complex_minus(S_p[49], t256);
+    S_c[49] = t257;
+    mstmm_complex t259 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t258 = mstmm_complex_times(V[2 * n + k], gain[9 * k + 8]);
+        t259 = mstmm_complex_plus(t259, t258);
+    }
+    const mstmm_complex t260 = mstmm_complex_minus(S_p[50], t259);
+    S_c[50] = t260;
+    mstmm_complex t262 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t261 = mstmm_complex_times(V[3 * n + k], gain[9 * k + 8]);
+        t262 = mstmm_complex_plus(t262, t261);
+    }
+    const mstmm_complex t263 = mstmm_complex_minus(S_p[51], t262);
+    S_c[51] = t263;
+    mstmm_complex t265 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t264 = mstmm_complex_times(V[4 * n + k], gain[9 * k + 8]);
+        t265 = mstmm_complex_plus(t265, t264);
+    }
+    const mstmm_complex t266 = mstmm_complex_minus(S_p[52], t265);
+    S_c[52] = t266;
+    mstmm_complex t268 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t267 = mstmm_complex_times(V[5 * n + k], gain[9 * k + 8]);
+        t268 = mstmm_complex_plus(t268, t267);
+    }
+    const mstmm_complex t269 = mstmm_complex_minus(S_p[53], t268);
+    S_c[53] = t269;
+    if (found_gain) return 2; /* a negative determinant */
+    return 0;
+}
+
+static int mstmm_complex_sweep_tangent_placed_node(int n, const double *restrict H, const mstmm_complex *restrict V,
+    const mstmm_complex *restrict D, const mstmm_complex *restrict S_p, const mstmm_complex *restrict Z_p,
+    mstmm_complex *restrict right, mstmm_complex *restrict gain, mstmm_complex *restrict S_c, mstmm_complex *restrict work)
+{
+    switch (n) { /* loops over a known number are unrolled */
+    case 1: return mstmm_complex_sweep_tangent_placed_node_sized(1, H, V, D, S_p, Z_p, right, gain, S_c, work);
+    case 2: return mstmm_complex_sweep_tangent_placed_node_sized(2, H, V, D, S_p, Z_p, right, gain, S_c, work);
+    case 3: return mstmm_complex_sweep_tangent_placed_node_sized(3, H, V, D, S_p, Z_p, right, gain, S_c, work);
+    case 4: return mstmm_complex_sweep_tangent_placed_node_sized(4, H, V, D, S_p, Z_p, right, gain, S_c, work);
+    default: return mstmm_complex_sweep_tangent_placed_node_sized(n, H, V, D, S_p, Z_p, right, gain, S_c, work);
+    }
+}
+
+/* load and rows along the unknowns by the change of pose
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  B_p[n][9] change of pose along the unknowns
+ * in  S_p[9][6] change of the load by the pose, one row per entry
+ * in  Z_p[9][n] own rows by the pose, one row per entry
+ * out K[n][6], added to what is there
+ * out Z_x[n][n], added to what is there
+ */
+static inline __attribute__((always_inline))
+int mstmm_complex_sweep_tangent_placed_own_sized(int n, const mstmm_complex *restrict B_p, const mstmm_complex *restrict S_p,
+    const mstmm_complex *restrict Z_p, mstmm_complex *restrict K, mstmm_complex *restrict Z_x)
+{
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t0 = mstmm_complex_times(S_p[0], B_p[9 * k]);
+        const mstmm_complex t1 = mstmm_complex_times(S_p[6], B_p[9 * k + 1]);
+        const mstmm_complex t2 = mstmm_complex_plus(t0, t1);
+        const mstmm_complex t3 = mstmm_complex_times(S_p[12], B_p[9 * k + 2]);
+        const mstmm_complex t4 = mstmm_complex_plus(t2, t3);
+        const mstmm_complex t5 = mstmm_complex_times(S_p[18], B_p[9 * k + 3]);
+        const mstmm_complex t6 = mstmm_complex_plus(t4, t5);
+        const mstmm_complex t7 = mstmm_complex_times(S_p[24], B_p[9 * k + 4]);
+        const mstmm_complex t8 = mstmm_complex_plus(t6, t7);
+        const mstmm_complex t9 = mstmm_complex_times(S_p[30], B_p[9 * k + 5]);
+        const mstmm_complex t10 = mstmm_complex_plus(t8, t9);
+        const mstmm_complex t11 = mstmm_complex_times(S_p[36], B_p[9 * k + 6]);
+        const mstmm_complex t12 = mstmm_complex_plus(t10, t11);
+        const mstmm_complex t13 = mstmm_complex_times(S_p[42], B_p[9 * k + 7]);
+        const mstmm_complex t14 = mstmm_complex_plus(t12, t13);
+        const mstmm_complex t15 = mstmm_complex_times(S_p[48], B_p[9 * k + 8]);
+        const mstmm_complex t16 = mstmm_complex_plus(t14, t15);
+        K[6 * k] = mstmm_complex_plus(K[6 * k], t16);
+    }
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t17 = mstmm_complex_times(S_p[1], B_p[9 * k]);
+        const mstmm_complex t18 = mstmm_complex_times(S_p[7], B_p[9 * k + 1]);
+        const mstmm_complex t19 = mstmm_complex_plus(t17, t18);
+        const mstmm_complex t20 = mstmm_complex_times(S_p[13], B_p[9 * k + 2]);
+        const mstmm_complex t21 = mstmm_complex_plus(t19, t20);
+        const mstmm_complex t22 = mstmm_complex_times(S_p[19], B_p[9 * k + 3]);
+        const mstmm_complex t23 = mstmm_complex_plus(t21, t22);
+        const mstmm_complex t24 = mstmm_complex_times(S_p[25], B_p[9 * k + 4]);
+        const mstmm_complex t25 = mstmm_complex_plus(t23, t24);
+        const mstmm_complex t26 = mstmm_complex_times(S_p[31], B_p[9 * k + 5]);
+        const mstmm_complex t27 = mstmm_complex_plus(t25, t26);
+        const mstmm_complex t28 = mstmm_complex_times(S_p[37], B_p[9 * k + 6]);
+        const mstmm_complex t29 = mstmm_complex_plus(t27, t28);
+        const mstmm_complex t30 = mstmm_complex_times(S_p[43], B_p[9 * k + 7]);
+        const mstmm_complex t31 = mstmm_complex_plus(t29, t30);
+        const mstmm_complex t32 = mstmm_complex_times(S_p[49], B_p[9 * k + 8]);
+        const mstmm_complex t33 = mstmm_complex_plus(t31, t32);
+        K[6 * k + 1] = mstmm_complex_plus(K[6 * k + 1], t33);
+    }
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t34 = mstmm_complex_times(S_p[2], B_p[9 * k]);
+        const mstmm_complex t35 = mstmm_complex_times(S_p[8], B_p[9 * k + 1]);
+        const mstmm_complex t36 = mstmm_complex_plus(t34, t35);
+        const mstmm_complex t37 = mstmm_complex_times(S_p[14], B_p[9 * k + 2]);
+        const mstmm_complex t38 = mstmm_complex_plus(t36, t37);
+        const mstmm_complex t39 = mstmm_complex_times(S_p[20], B_p[9 * k + 3]);
+        const mstmm_complex t40 = mstmm_complex_plus(t38, t39);
+        const mstmm_complex t41 = mstmm_complex_times(S_p[26], B_p[9 * k + 4]);
+        const mstmm_complex t42 = mstmm_complex_plus(t40, t41);
+        const mstmm_complex t43 = mstmm_complex_times(S_p[32], B_p[9 * k + 5]);
+        const mstmm_complex t44 = mstmm_complex_plus(t42, t43);
+        const mstmm_complex t45 = mstmm_complex_times(S_p[38], B_p[9 * k + 6]);
+        const mstmm_complex t46 = mstmm_complex_plus(t44, t45);
+        const mstmm_complex t47 = mstmm_complex_times(S_p[44], B_p[9 * k + 7]);
+        const mstmm_complex t48 = mstmm_complex_plus(t46, t47);
+        const mstmm_complex t49 = mstmm_complex_times(S_p[50], B_p[9 * k + 8]);
+        const mstmm_complex t50 = mstmm_complex_plus(t48, t49);
+        K[6 * k + 2] = mstmm_complex_plus(K[6 * k + 2], t50);
+    }
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t51 = mstmm_complex_times(S_p[3], B_p[9 * k]);
+        const mstmm_complex t52 = mstmm_complex_times(S_p[9], B_p[9 * k + 1]);
+        const mstmm_complex t53 = mstmm_complex_plus(t51, t52);
+        const mstmm_complex t54 = mstmm_complex_times(S_p[15], B_p[9 * k + 2]);
+        const mstmm_complex t55 = mstmm_complex_plus(t53, t54);
+        const mstmm_complex t56 = mstmm_complex_times(S_p[21], B_p[9 * k + 3]);
+        const mstmm_complex t57 = mstmm_complex_plus(t55, t56);
+        const mstmm_complex t58 = mstmm_complex_times(S_p[27], B_p[9 * k + 4]);
+        const mstmm_complex t59 = mstmm_complex_plus(t57, t58);
+        const mstmm_complex t60 = mstmm_complex_times(S_p[33], B_p[9 * k + 5]);
+        const mstmm_complex t61 = mstmm_complex_plus(t59, t60);
+        const mstmm_complex t62 = mstmm_complex_times(S_p[39], B_p[9 * k + 6]);
+        const mstmm_complex t63 = mstmm_complex_plus(t61, t62);
+        const mstmm_complex t64 = mstmm_complex_times(S_p[45], B_p[9 * k + 7]);
+        const mstmm_complex t65 = mstmm_complex_plus(t63, t64);
+        const mstmm_complex t66 = mstmm_complex_times(S_p[51], B_p[9 * k + 8]);
+        const mstmm_complex t67 = mstmm_complex_plus(t65, t66);
+        K[6 * k + 3] = mstmm_complex_plus(K[6 * k + 3], t67);
+    }
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t68 = mstmm_complex_times(S_p[4], B_p[9 * k]);
+        const mstmm_complex t69 = mstmm_complex_times(S_p[10], B_p[9 * k + 1]);
+        const mstmm_complex t70 = mstmm_complex_plus(t68, t69);
+        const mstmm_complex t71 = mstmm_complex_times(S_p[16], B_p[9 * k + 2]);
+        const mstmm_complex t72 = mstmm_complex_plus(t70, t71);
+        const mstmm_complex t73 = mstmm_complex_times(S_p[22], B_p[9 * k + 3]);
+        const mstmm_complex t74 = mstmm_complex_plus(t72, t73);
+        const mstmm_complex t75 = mstmm_complex_times(S_p[28], B_p[9 * k + 4]);
+        const mstmm_complex t76 = mstmm_complex_plus(t74, t75);
+        const mstmm_complex t77 = mstmm_complex_times(S_p[34], B_p[9 * k + 5]);
+        const mstmm_complex t78 = mstmm_complex_plus(t76, t77);
+        const mstmm_complex t79 = mstmm_complex_times(S_p[40], B_p[9 * k + 6]);
+        const mstmm_complex t80 = mstmm_complex_plus(t78, t79);
+        const mstmm_complex t81 = mstmm_complex_times(S_p[46], B_p[9 * k + 7]);
+        const mstmm_complex t82 = mstmm_complex_plus(t80, t81);
+        const mstmm_complex t83 = mstmm_complex_times(S_p[52], B_p[9 * k + 8]);
+        const mstmm_complex t84 = mstmm_complex_plus(t82, t83);
+        K[6 * k + 4] = mstmm_complex_plus(K[6 * k + 4], t84);
+    }
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t85 = mstmm_complex_times(S_p[5], B_p[9 * k]);
+        const mstmm_complex t86 = mstmm_complex_times(S_p[11], B_p[9 * k + 1]);
+        const mstmm_complex t87 = mstmm_complex_plus(t85, t86);
+        const mstmm_complex t88 = mstmm_complex_times(S_p[17], B_p[9 * k + 2]);
+        const mstmm_complex t89 = mstmm_complex_plus(t87, t88);
+        const mstmm_complex t90 = mstmm_complex_times(S_p[23], B_p[9 * k + 3]);
+        const mstmm_complex t91 = mstmm_complex_plus(t89, t90);
+        const mstmm_complex t92 = mstmm_complex_times(S_p[29], B_p[9 * k + 4]);
+        const mstmm_complex t93 = mstmm_complex_plus(t91, t92);
+        const mstmm_complex t94 = mstmm_complex_times(S_p[35], B_p[9 * k + 5]);
+        const mstmm_complex t95 = mstmm_complex_plus(t93, t94);
+        const mstmm_complex t96 = mstmm_complex_times(S_p[41], B_p[9 * k + 6]);
+        const mstmm_complex t97 = mstmm_complex_plus(t95, t96);
+        const mstmm_complex t98 = mstmm_complex_times(S_p[47], B_p[9 * k + 7]);
+        const mstmm_complex t99 = mstmm_complex_plus(t97, t98);
+        const mstmm_complex t100 = mstmm_complex_times(S_p[53], B_p[9 * k + 8]);
+        const mstmm_complex t101 = mstmm_complex_plus(t99, t100);
+        K[6 * k + 5] = mstmm_complex_plus(K[6 * k + 5], t101);
+    }
+    for (int k = 0; k < n; ++k) {
+        for (int l = 0; l < n; ++l) {
+            const mstmm_complex t102 = mstmm_complex_times(B_p[9 * k], Z_p[l]);
+            const mstmm_complex t103 = mstmm_complex_times(B_p[9 * k + 1], Z_p[n + l]);
+            const mstmm_complex t104 = mstmm_complex_plus(t102, t103);
+            const mstmm_complex t105 = mstmm_complex_times(B_p[9 * k + 2], Z_p[2 * n + l]);
+            const mstmm_complex t106 = mstmm_complex_plus(t104, t105);
+            const mstmm_complex t107 = mstmm_complex_times(B_p[9 * k + 3], Z_p[3 * n + l]);
+            const mstmm_complex t108 = mstmm_complex_plus(t106, t107);
+            const mstmm_complex t109 = mstmm_complex_times(B_p[9 * k + 4], Z_p[4 * n + l]);
+            const mstmm_complex t110 = mstmm_complex_plus(t108, t109);
+            const mstmm_complex t111 = mstmm_complex_times(B_p[9 * k + 5], Z_p[5 * n + l]);
+            const mstmm_complex t112 = mstmm_complex_plus(t110, t111);
+            const mstmm_complex t113 = mstmm_complex_times(B_p[9 * k + 6], Z_p[6 * n + l]);
+            const mstmm_complex t114 = mstmm_complex_plus(t112, t113);
+            const mstmm_complex t115 = mstmm_complex_times(B_p[9 * k + 7], Z_p[7 * n + l]);
+            const mstmm_complex t116 = mstmm_complex_plus(t114, t115);
+            const mstmm_complex t117 = mstmm_complex_times(B_p[9 * k + 8], Z_p[8 * n + l]);
+            const mstmm_complex t118 = mstmm_complex_plus(t116, t117);
+            Z_x[n * k + l] = mstmm_complex_plus(Z_x[n * k + l], t118);
+        }
+    }
+    return 0;
+}
+
+static int mstmm_complex_sweep_tangent_placed_own(int n, const mstmm_complex *restrict B_p, const mstmm_complex *restrict S_p,
+    const mstmm_complex *restrict Z_p, mstmm_complex *restrict K, mstmm_complex *restrict Z_x)
+{
+    switch (n) { /* loops over a known number are unrolled */
+    case 1: return mstmm_complex_sweep_tangent_placed_own_sized(1, B_p, S_p, Z_p, K, Z_x);
+    case 2: return mstmm_complex_sweep_tangent_placed_own_sized(2, B_p, S_p, Z_p, K, Z_x);
+    case 3: return mstmm_complex_sweep_tangent_placed_own_sized(3, B_p, S_p, Z_p, K, Z_x);
+    case 4: return mstmm_complex_sweep_tangent_placed_own_sized(4, B_p, S_p, Z_p, K, Z_x);
+    default: return mstmm_complex_sweep_tangent_placed_own_sized(n, B_p, S_p, Z_p, K, Z_x);
+    }
+}
+
 /* loads by the pose of the part outboard of a port, along the unknowns of its body
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
@@ -17549,7 +18277,7 @@ static int mstmm_complex_sweep_tangent_node(int n, const double *restrict H, con
  * out Z_x[n][n], added to what is there
  */
 static inline __attribute__((always_inline))
-int mstmm_complex_sweep_tangent_placed_absorb_sized(int n, const double *restrict Rc,
+int mstmm_complex_sweep_tangent_placed_port_sized(int n, const double *restrict Rc,
     const double *restrict r, const double *restrict H, const mstmm_complex *restrict B_p,
     const mstmm_complex *restrict S_p, const mstmm_complex *restrict T_p, mstmm_complex *restrict K, mstmm_complex *restrict Z_p,
     mstmm_complex *restrict Z_x)
@@ -18350,784 +19078,16 @@ int mstmm_complex_sweep_tangent_placed_absorb_sized(int n, const double *restric
     return 0;
 }
 
-static int mstmm_complex_sweep_tangent_placed_absorb(int n, const double *restrict Rc, const double *restrict r,
+static int mstmm_complex_sweep_tangent_placed_port(int n, const double *restrict Rc, const double *restrict r,
     const double *restrict H, const mstmm_complex *restrict B_p, const mstmm_complex *restrict S_p,
     const mstmm_complex *restrict T_p, mstmm_complex *restrict K, mstmm_complex *restrict Z_p, mstmm_complex *restrict Z_x)
 {
     switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_complex_sweep_tangent_placed_absorb_sized(1, Rc, r, H, B_p, S_p, T_p, K, Z_p, Z_x);
-    case 2: return mstmm_complex_sweep_tangent_placed_absorb_sized(2, Rc, r, H, B_p, S_p, T_p, K, Z_p, Z_x);
-    case 3: return mstmm_complex_sweep_tangent_placed_absorb_sized(3, Rc, r, H, B_p, S_p, T_p, K, Z_p, Z_x);
-    case 4: return mstmm_complex_sweep_tangent_placed_absorb_sized(4, Rc, r, H, B_p, S_p, T_p, K, Z_p, Z_x);
-    default: return mstmm_complex_sweep_tangent_placed_absorb_sized(n, Rc, r, H, B_p, S_p, T_p, K, Z_p, Z_x);
-    }
-}
-
-/* rows less their change by the change of pose
- * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
- * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  gain[n][9] D^-1 times the rows by the pose
- * in  p[9] change of pose: rotation, position and velocity of P, own axes
- * out y[n] the remainder of the rows, added to what is there
- */
-static inline __attribute__((always_inline))
-int mstmm_complex_sweep_tangent_placed_left_sized(int n, const mstmm_complex *restrict gain, const mstmm_complex *restrict p,
-    mstmm_complex *restrict y)
-{
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t0 = mstmm_complex_times(p[0], gain[9 * k]);
-        const mstmm_complex t1 = mstmm_complex_times(p[1], gain[9 * k + 1]);
-        const mstmm_complex t2 = mstmm_complex_plus(t0, t1);
-        const mstmm_complex t3 = mstmm_complex_times(p[2], gain[9 * k + 2]);
-        const mstmm_complex t4 = mstmm_complex_plus(t2, t3);
-        const mstmm_complex t5 = mstmm_complex_times(p[3], gain[9 * k + 3]);
-        const mstmm_complex t6 = mstmm_complex_plus(t4, t5);
-        const mstmm_complex t7 = mstmm_complex_times(p[4], gain[9 * k + 4]);
-        const mstmm_complex t8 = mstmm_complex_plus(t6, t7);
-        const mstmm_complex t9 = mstmm_complex_times(p[5], gain[9 * k + 5]);
-        const mstmm_complex t10 = mstmm_complex_plus(t8, t9);
-        const mstmm_complex t11 = mstmm_complex_times(p[6], gain[9 * k + 6]);
-        const mstmm_complex t12 = mstmm_complex_plus(t10, t11);
-        const mstmm_complex t13 = mstmm_complex_times(p[7], gain[9 * k + 7]);
-        const mstmm_complex t14 = mstmm_complex_plus(t12, t13);
-        const mstmm_complex t15 = mstmm_complex_times(p[8], gain[9 * k + 8]);
-        const mstmm_complex t16 = mstmm_complex_plus(t14, t15);
-        const mstmm_complex t17 = mstmm_complex_scaled(-1, t16);
-        y[k] = mstmm_complex_plus(y[k], t17);
-    }
-    return 0;
-}
-
-static int mstmm_complex_sweep_tangent_placed_left(int n, const mstmm_complex *restrict gain, const mstmm_complex *restrict p,
-    mstmm_complex *restrict y)
-{
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_complex_sweep_tangent_placed_left_sized(1, gain, p, y);
-    case 2: return mstmm_complex_sweep_tangent_placed_left_sized(2, gain, p, y);
-    case 3: return mstmm_complex_sweep_tangent_placed_left_sized(3, gain, p, y);
-    case 4: return mstmm_complex_sweep_tangent_placed_left_sized(4, gain, p, y);
-    default: return mstmm_complex_sweep_tangent_placed_left_sized(n, gain, p, y);
-    }
-}
-
-/* unknowns of a flexible body eliminated from loads by the pose
- * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
- * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  H[6][n] motion subspace of the unknowns
- * in  V[6][n] K + G
- * in  D[n][n] rows by unknowns
- * in  S_p[9][6] change of the load by the pose, one row per entry
- * in  Z_p[9][n] own rows by the pose, one row per entry
- * out right[n][9] rows by the pose
- * out gain[n][9] D^-1 times the rows by the pose
- * out S_c[9][6] S_p without the unknowns, one row per entry
- * out work[n][n] factor L, D of solve
- */
-static inline __attribute__((always_inline))
-int mstmm_complex_sweep_tangent_placed_node_sized(int n, const double *restrict H, const mstmm_complex *restrict V,
-    const mstmm_complex *restrict D, const mstmm_complex *restrict S_p, const mstmm_complex *restrict Z_p,
-    mstmm_complex *restrict right, mstmm_complex *restrict gain, mstmm_complex *restrict S_c, mstmm_complex *restrict work)
-{
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t0 = mstmm_complex_scaled(H[k], S_p[0]);
-        const mstmm_complex t1 = mstmm_complex_scaled(H[n + k], S_p[1]);
-        const mstmm_complex t2 = mstmm_complex_plus(t0, t1);
-        const mstmm_complex t3 = mstmm_complex_scaled(H[2 * n + k], S_p[2]);
-        const mstmm_complex t4 = mstmm_complex_plus(t2, t3);
-        const mstmm_complex t5 = mstmm_complex_scaled(H[3 * n + k], S_p[3]);
-        const mstmm_complex t6 = mstmm_complex_plus(t4, t5);
-        const mstmm_complex t7 = mstmm_complex_scaled(H[4 * n + k], S_p[4]);
-        const mstmm_complex t8 = mstmm_complex_plus(t6, t7);
-        const mstmm_complex t9 = mstmm_complex_scaled(H[5 * n + k], S_p[5]);
-        const mstmm_complex t10 = mstmm_complex_plus(t8, t9);
-        const mstmm_complex t11 = mstmm_complex_plus(t10, Z_p[k]);
-        right[9 * k] = t11;
-    }
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t12 = mstmm_complex_scaled(H[k], S_p[6]);
-        const mstmm_complex t13 = mstmm_complex_scaled(H[n + k], S_p[7]);
-        const mstmm_complex t14 = mstmm_complex_plus(t12, t13);
-        const mstmm_complex t15 = mstmm_complex_scaled(H[2 * n + k], S_p[8]);
-        const mstmm_complex t16 = mstmm_complex_plus(t14, t15);
-        const mstmm_complex t17 = mstmm_complex_scaled(H[3 * n + k], S_p[9]);
-        const mstmm_complex t18 = mstmm_complex_plus(t16, t17);
-        const mstmm_complex t19 = mstmm_complex_scaled(H[4 * n + k], S_p[10]);
-        const mstmm_complex t20 = mstmm_complex_plus(t18, t19);
-        const mstmm_complex t21 = mstmm_complex_scaled(H[5 * n + k], S_p[11]);
-        const mstmm_complex t22 = mstmm_complex_plus(t20, t21);
-        const mstmm_complex t23 = mstmm_complex_plus(t22, Z_p[n + k]);
-        right[9 * k + 1] = t23;
-    }
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t24 = mstmm_complex_scaled(H[k], S_p[12]);
-        const mstmm_complex t25 = mstmm_complex_scaled(H[n + k], S_p[13]);
-        const mstmm_complex t26 = mstmm_complex_plus(t24, t25);
-        const mstmm_complex t27 = mstmm_complex_scaled(H[2 * n + k], S_p[14]);
-        const mstmm_complex t28 = mstmm_complex_plus(t26, t27);
-        const mstmm_complex t29 = mstmm_complex_scaled(H[3 * n + k], S_p[15]);
-        const mstmm_complex t30 = mstmm_complex_plus(t28, t29);
-        const mstmm_complex t31 = mstmm_complex_scaled(H[4 * n + k], S_p[16]);
-        const mstmm_complex t32 = mstmm_complex_plus(t30, t31);
-        const mstmm_complex t33 = mstmm_complex_scaled(H[5 * n + k], S_p[17]);
-        const mstmm_complex t34 = mstmm_complex_plus(t32, t33);
-        const mstmm_complex t35 = mstmm_complex_plus(t34, Z_p[2 * n + k]);
-        right[9 * k + 2] = t35;
-    }
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t36 = mstmm_complex_scaled(H[k], S_p[18]);
-        const mstmm_complex t37 = mstmm_complex_scaled(H[n + k], S_p[19]);
-        const mstmm_complex t38 = mstmm_complex_plus(t36, t37);
-        const mstmm_complex t39 = mstmm_complex_scaled(H[2 * n + k], S_p[20]);
-        const mstmm_complex t40 = mstmm_complex_plus(t38, t39);
-        const mstmm_complex t41 = mstmm_complex_scaled(H[3 * n + k], S_p[21]);
-        const mstmm_complex t42 = mstmm_complex_plus(t40, t41);
-        const mstmm_complex t43 = mstmm_complex_scaled(H[4 * n + k], S_p[22]);
-        const mstmm_complex t44 = mstmm_complex_plus(t42, t43);
-        const mstmm_complex t45 = mstmm_complex_scaled(H[5 * n + k], S_p[23]);
-        const mstmm_complex t46 = mstmm_complex_plus(t44, t45);
-        const mstmm_complex t47 = mstmm_complex_plus(t46, Z_p[3 * n + k]);
-        right[9 * k + 3] = t47;
-    }
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t48 = mstmm_complex_scaled(H[k], S_p[24]);
-        const mstmm_complex t49 = mstmm_complex_scaled(H[n + k], S_p[25]);
-        const mstmm_complex t50 = mstmm_complex_plus(t48, t49);
-        const mstmm_complex t51 = mstmm_complex_scaled(H[2 * n + k], S_p[26]);
-        const mstmm_complex t52 = mstmm_complex_plus(t50, t51);
-        const mstmm_complex t53 = mstmm_complex_scaled(H[3 * n + k], S_p[27]);
-        const mstmm_complex t54 = mstmm_complex_plus(t52, t53);
-        const mstmm_complex t55 = mstmm_complex_scaled(H[4 * n + k], S_p[28]);
-        const mstmm_complex t56 = mstmm_complex_plus(t54, t55);
-        const mstmm_complex t57 = mstmm_complex_scaled(H[5 * n + k], S_p[29]);
-        const mstmm_complex t58 = mstmm_complex_plus(t56, t57);
-        const mstmm_complex t59 = mstmm_complex_plus(t58, Z_p[4 * n + k]);
-        right[9 * k + 4] = t59;
-    }
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t60 = mstmm_complex_scaled(H[k], S_p[30]);
-        const mstmm_complex t61 = mstmm_complex_scaled(H[n + k], S_p[31]);
-        const mstmm_complex t62 = mstmm_complex_plus(t60, t61);
-        const mstmm_complex t63 = mstmm_complex_scaled(H[2 * n + k], S_p[32]);
-        const mstmm_complex t64 = mstmm_complex_plus(t62, t63);
-        const mstmm_complex t65 = mstmm_complex_scaled(H[3 * n + k], S_p[33]);
-        const mstmm_complex t66 = mstmm_complex_plus(t64, t65);
-        const mstmm_complex t67 = mstmm_complex_scaled(H[4 * n + k], S_p[34]);
-        const mstmm_complex t68 = mstmm_complex_plus(t66, t67);
-        const mstmm_complex t69 = mstmm_complex_scaled(H[5 * n + k], S_p[35]);
-        const mstmm_complex t70 = mstmm_complex_plus(t68, t69);
-        const mstmm_complex t71 = mstmm_complex_plus(t70, Z_p[5 * n + k]);
-        right[9 * k + 5] = t71;
-    }
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t72 = mstmm_complex_scaled(H[k], S_p[36]);
-        const mstmm_complex t73 = mstmm_complex_scaled(H[n + k], S_p[37]);
-        const mstmm_complex t74 = mstmm_complex_plus(t72, t73);
-        const mstmm_complex t75 = mstmm_complex_scaled(H[2 * n + k], S_p[38]);
-        const mstmm_complex t76 = mstmm_complex_plus(t74, t75);
-        const mstmm_complex t77 = mstmm_complex_scaled(H[3 * n + k], S_p[39]);
-        const mstmm_complex t78 = mstmm_complex_plus(t76, t77);
-        const mstmm_complex t79 = mstmm_complex_scaled(H[4 * n + k], S_p[40]);
-        const mstmm_complex t80 = mstmm_complex_plus(t78, t79);
-        const mstmm_complex t81 = mstmm_complex_scaled(H[5 * n + k], S_p[41]);
-        const mstmm_complex t82 = mstmm_complex_plus(t80, t81);
-        const mstmm_complex t83 = mstmm_complex_plus(t82, Z_p[6 * n + k]);
-        right[9 * k + 6] = t83;
-    }
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t84 = mstmm_complex_scaled(H[k], S_p[42]);
-        const mstmm_complex t85 = mstmm_complex_scaled(H[n + k], S_p[43]);
-        const mstmm_complex t86 = mstmm_complex_plus(t84, t85);
-        const mstmm_complex t87 = mstmm_complex_scaled(H[2 * n + k], S_p[44]);
-        const mstmm_complex t88 = mstmm_complex_plus(t86, t87);
-        const mstmm_complex t89 = mstmm_complex_scaled(H[3 * n + k], S_p[45]);
-        const mstmm_complex t90 = mstmm_complex_plus(t88, t89);
-        const mstmm_complex t91 = mstmm_complex_scaled(H[4 * n + k], S_p[46]);
-        const mstmm_complex t92 = mstmm_complex_plus(t90, t91);
-        const mstmm_complex t93 = mstmm_complex_scaled(H[5 * n + k], S_p[47]);
-        const mstmm_complex t94 = mstmm_complex_plus(t92, t93);
-        const mstmm_complex t95 = mstmm_complex_plus(t94, Z_p[7 * n + k]);
-        right[9 * k + 7] = t95;
-    }
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t96 = mstmm_complex_scaled(H[k], S_p[48]);
-        const mstmm_complex t97 = mstmm_complex_scaled(H[n + k], S_p[49]);
-        const mstmm_complex t98 = mstmm_complex_plus(t96, t97);
-        const mstmm_complex t99 = mstmm_complex_scaled(H[2 * n + k], S_p[50]);
-        const mstmm_complex t100 = mstmm_complex_plus(t98, t99);
-        const mstmm_complex t101 = mstmm_complex_scaled(H[3 * n + k], S_p[51]);
-        const mstmm_complex t102 = mstmm_complex_plus(t100, t101);
-        const mstmm_complex t103 = mstmm_complex_scaled(H[4 * n + k], S_p[52]);
-        const mstmm_complex t104 = mstmm_complex_plus(t102, t103);
-        const mstmm_complex t105 = mstmm_complex_scaled(H[5 * n + k], S_p[53]);
-        const mstmm_complex t106 = mstmm_complex_plus(t104, t105);
-        const mstmm_complex t107 = mstmm_complex_plus(t106, Z_p[8 * n + k]);
-        right[9 * k + 8] = t107;
-    }
-    /* a pivot of D vanishes: a motion is undetermined */
-    const int found_gain = mstmm_complex_solve_lu(n, 9, D, right, gain, work, 1e-13);
-    if (found_gain == 1) return 1;
-    mstmm_complex t109 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t108 = mstmm_complex_times(gain[9 * k], V[k]);
-        t109 = mstmm_complex_plus(t109, t108);
-    }
-    const mstmm_complex t110 = mstmm_complex_minus(S_p[0], t109);
-    S_c[0] = t110;
-    mstmm_complex t112 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t111 = mstmm_complex_times(gain[9 * k], V[n + k]);
-        t112 = mstmm_complex_plus(t112, t111);
-    }
-    const mstmm_complex t113 = mstmm_complex_minus(S_p[1], t112);
-    S_c[1] = t113;
-    mstmm_complex t115 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t114 = mstmm_complex_times(gain[9 * k], V[2 * n + k]);
-        t115 = mstmm_complex_plus(t115, t114);
-    }
-    const mstmm_complex t116 = mstmm_complex_minus(S_p[2], t115);
-    S_c[2] = t116;
-    mstmm_complex t118 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t117 = mstmm_complex_times(gain[9 * k], V[3 * n + k]);
-        t118 = mstmm_complex_plus(t118, t117);
-    }
-    const mstmm_complex t119 = mstmm_complex_minus(S_p[3], t118);
-    S_c[3] = t119;
-    mstmm_complex t121 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t120 = mstmm_complex_times(gain[9 * k], V[4 * n + k]);
-        t121 = mstmm_complex_plus(t121, t120);
-    }
-    const mstmm_complex t122 = mstmm_complex_minus(S_p[4], t121);
-    S_c[4] = t122;
-    mstmm_complex t124 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t123 = mstmm_complex_times(gain[9 * k], V[5 * n + k]);
-        t124 = mstmm_complex_plus(t124, t123);
-    }
-    const mstmm_complex t125 = mstmm_complex_minus(S_p[5], t124);
-    S_c[5] = t125;
-    mstmm_complex t127 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t126 = mstmm_complex_times(V[k], gain[9 * k + 1]);
-        t127 = mstmm_complex_plus(t127, t126);
-    }
-    const mstmm_complex t128 = mstmm_complex_minus(S_p[6], t127);
-    S_c[6] = t128;
-    mstmm_complex t130 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t129 = mstmm_complex_times(V[n + k], gain[9 * k + 1]);
-        t130 = mstmm_complex_plus(t130, t129);
-    }
-    const mstmm_complex t131 = mstmm_complex_minus(S_p[7], t130);
-    S_c[7] = t131;
-    mstmm_complex t133 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t132 = mstmm_complex_times(V[2 * n + k], gain[9 * k + 1]);
-        t133 = mstmm_complex_plus(t133, t132);
-    }
-    const mstmm_complex t134 = mstmm_complex_minus(S_p[8], t133);
-    S_c[8] = t134;
-    mstmm_complex t136 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t135 = mstmm_complex_times(V[3 * n + k], gain[9 * k + 1]);
-        t136 = mstmm_complex_plus(t136, t135);
-    }
-    const mstmm_complex t137 = mstmm_complex_minus(S_p[9], t136);
-    S_c[9] = t137;
-    mstmm_complex t139 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t138 = mstmm_complex_times(V[4 * n + k], gain[9 * k + 1]);
-        t139 = mstmm_complex_plus(t139, t138);
-    }
-    const mstmm_complex t140 = mstmm_complex_minus(S_p[10], t139);
-    S_c[10] = t140;
-    mstmm_complex t142 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t141 = mstmm_complex_times(V[5 * n + k], gain[9 * k + 1]);
-        t142 = mstmm_complex_plus(t142, t141);
-    }
-    const mstmm_complex t143 = mstmm_complex_minus(S_p[11], t142);
-    S_c[11] = t143;
-    mstmm_complex t145 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t144 = mstmm_complex_times(V[k], gain[9 * k + 2]);
-        t145 = mstmm_complex_plus(t145, t144);
-    }
-    const mstmm_complex t146 = mstmm_complex_minus(S_p[12], t145);
-    S_c[12] = t146;
-    mstmm_complex t148 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t147 = mstmm_complex_times(V[n + k], gain[9 * k + 2]);
-        t148 = mstmm_complex_plus(t148, t147);
-    }
-    const mstmm_complex t149 = mstmm_complex_minus(S_p[13], t148);
-    S_c[13] = t149;
-    mstmm_complex t151 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t150 = mstmm_complex_times(V[2 * n + k], gain[9 * k + 2]);
-        t151 = mstmm_complex_plus(t151, t150);
-    }
-    const mstmm_complex t152 = mstmm_complex_minus(S_p[14], t151);
-    S_c[14] = t152;
-    mstmm_complex t154 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t153 = mstmm_complex_times(V[3 * n + k], gain[9 * k + 2]);
-        t154 = mstmm_complex_plus(t154, t153);
-    }
-    const mstmm_complex t155 = mstmm_complex_minus(S_p[15], t154);
-    S_c[15] = t155;
-    mstmm_complex t157 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t156 = mstmm_complex_times(V[4 * n + k], gain[9 * k + 2]);
-        t157 = mstmm_complex_plus(t157, t156);
-    }
-    const mstmm_complex t158 = mstmm_complex_minus(S_p[16], t157);
-    S_c[16] = t158;
-    mstmm_complex t160 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t159 = mstmm_complex_times(V[5 * n + k], gain[9 * k + 2]);
-        t160 = mstmm_complex_plus(t160, t159);
-    }
-    const mstmm_complex t161 = mstmm_complex_minus(S_p[17], t160);
-    S_c[17] = t161;
-    mstmm_complex t163 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t162 = mstmm_complex_times(V[k], gain[9 * k + 3]);
-        t163 = mstmm_complex_plus(t163, t162);
-    }
-    const mstmm_complex t164 = mstmm_complex_minus(S_p[18], t163);
-    S_c[18] = t164;
-    mstmm_complex t166 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t165 = mstmm_complex_times(V[n + k], gain[9 * k + 3]);
-        t166 = mstmm_complex_plus(t166, t165);
-    }
-    const mstmm_complex t167 = mstmm_complex_minus(S_p[19], t166);
-    S_c[19] = t167;
-    mstmm_complex t169 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t168 = mstmm_complex_times(V[2 * n + k], gain[9 * k + 3]);
-        t169 = mstmm_complex_plus(t169, t168);
-    }
-    const mstmm_complex t170 = mstmm_complex_minus(S_p[20], t169);
-    S_c[20] = t170;
-    mstmm_complex t172 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t171 = mstmm_complex_times(V[3 * n + k], gain[9 * k + 3]);
-        t172 = mstmm_complex_plus(t172, t171);
-    }
-    const mstmm_complex t173 = mstmm_complex_minus(S_p[21], t172);
-    S_c[21] = t173;
-    mstmm_complex t175 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t174 = mstmm_complex_times(V[4 * n + k], gain[9 * k + 3]);
-        t175 = mstmm_complex_plus(t175, t174);
-    }
-    const mstmm_complex t176 = mstmm_complex_minus(S_p[22], t175);
-    S_c[22] = t176;
-    mstmm_complex t178 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t177 = mstmm_complex_times(V[5 * n + k], gain[9 * k + 3]);
-        t178 = mstmm_complex_plus(t178, t177);
-    }
-    const mstmm_complex t179 = mstmm_complex_minus(S_p[23], t178);
-    S_c[23] = t179;
-    mstmm_complex t181 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t180 = mstmm_complex_times(V[k], gain[9 * k + 4]);
-        t181 = mstmm_complex_plus(t181, t180);
-    }
-    const mstmm_complex t182 = mstmm_complex_minus(S_p[24], t181);
-    S_c[24] = t182;
-    mstmm_complex t184 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t183 = mstmm_complex_times(V[n + k], gain[9 * k + 4]);
-        t184 = mstmm_complex_plus(t184, t183);
-    }
-    const mstmm_complex t185 = mstmm_complex_minus(S_p[25], t184);
-    S_c[25] = t185;
-    mstmm_complex t187 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t186 = mstmm_complex_times(V[2 * n + k], gain[9 * k + 4]);
-        t187 = mstmm_complex_plus(t187, t186);
-    }
-    const mstmm_complex t188 = mstmm_complex_minus(S_p[26], t187);
-    S_c[26] = t188;
-    mstmm_complex t190 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t189 = mstmm_complex_times(V[3 * n + k], gain[9 * k + 4]);
-        t190 = mstmm_complex_plus(t190, t189);
-    }
-    const mstmm_complex t191 = mstmm_complex_minus(S_p[27], t190);
-    S_c[27] = t191;
-    mstmm_complex t193 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t192 = mstmm_complex_times(V[4 * n + k], gain[9 * k + 4]);
-        t193 = mstmm_complex_plus(t193, t192);
-    }
-    const mstmm_complex t194 = mstmm_complex_minus(S_p[28], t193);
-    S_c[28] = t194;
-    mstmm_complex t196 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t195 = mstmm_complex_times(V[5 * n + k], gain[9 * k + 4]);
-        t196 = mstmm_complex_plus(t196, t195);
-    }
-    const mstmm_complex t197 = mstmm_complex_minus(S_p[29], t196);
-    S_c[29] = t197;
-    mstmm_complex t199 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t198 = mstmm_complex_times(V[k], gain[9 * k + 5]);
-        t199 = mstmm_complex_plus(t199, t198);
-    }
-    const mstmm_complex t200 = mstmm_complex_minus(S_p[30], t199);
-    S_c[30] = t200;
-    mstmm_complex t202 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t201 = mstmm_complex_times(V[n + k], gain[9 * k + 5]);
-        t202 = mstmm_complex_plus(t202, t201);
-    }
-    const mstmm_complex t203 = mstmm_complex_minus(S_p[31], t202);
-    S_c[31] = t203;
-    mstmm_complex t205 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t204 = mstmm_complex_times(V[2 * n + k], gain[9 * k + 5]);
-        t205 = mstmm_complex_plus(t205, t204);
-    }
-    const mstmm_complex t206 = mstmm_complex_minus(S_p[32], t205);
-    S_c[32] = t206;
-    mstmm_complex t208 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t207 = mstmm_complex_times(V[3 * n + k], gain[9 * k + 5]);
-        t208 = mstmm_complex_plus(t208, t207);
-    }
-    const mstmm_complex t209 = mstmm_complex_minus(S_p[33], t208);
-    S_c[33] = t209;
-    mstmm_complex t211 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t210 = mstmm_complex_times(V[4 * n + k], gain[9 * k + 5]);
-        t211 = mstmm_complex_plus(t211, t210);
-    }
-    const mstmm_complex t212 = mstmm_complex_minus(S_p[34], t211);
-    S_c[34] = t212;
-    mstmm_complex t214 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t213 = mstmm_complex_times(V[5 * n + k], gain[9 * k + 5]);
-        t214 = mstmm_complex_plus(t214, t213);
-    }
-    const mstmm_complex t215 = mstmm_complex_minus(S_p[35], t214);
-    S_c[35] = t215;
-    mstmm_complex t217 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t216 = mstmm_complex_times(V[k], gain[9 * k + 6]);
-        t217 = mstmm_complex_plus(t217, t216);
-    }
-    const mstmm_complex t218 = mstmm_complex_minus(S_p[36], t217);
-    S_c[36] = t218;
-    mstmm_complex t220 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t219 = mstmm_complex_times(V[n + k], gain[9 * k + 6]);
-        t220 = mstmm_complex_plus(t220, t219);
-    }
-    const mstmm_complex t221 = mstmm_complex_minus(S_p[37], t220);
-    S_c[37] = t221;
-    mstmm_complex t223 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t222 = mstmm_complex_times(V[2 * n + k], gain[9 * k + 6]);
-        t223 = mstmm_complex_plus(t223, t222);
-    }
-    const mstmm_complex t224 = mstmm_complex_minus(S_p[38], t223);
-    S_c[38] = t224;
-    mstmm_complex t226 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t225 = mstmm_complex_times(V[3 * n + k], gain[9 * k + 6]);
-        t226 = mstmm_complex_plus(t226, t225);
-    }
-    const mstmm_complex t227 = mstmm_complex_minus(S_p[39], t226);
-    S_c[39] = t227;
-    mstmm_complex t229 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t228 = mstmm_complex_times(V[4 * n + k], gain[9 * k + 6]);
-        t229 = mstmm_complex_plus(t229, t228);
-    }
-    const mstmm_complex t230 = mstmm_complex_minus(S_p[40], t229);
-    S_c[40] = t230;
-    mstmm_complex t232 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t231 = mstmm_complex_times(V[5 * n + k], gain[9 * k + 6]);
-        t232 = mstmm_complex_plus(t232, t231);
-    }
-    const mstmm_complex t233 = mstmm_complex_minus(S_p[41], t232);
-    S_c[41] = t233;
-    mstmm_complex t235 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t234 = mstmm_complex_times(V[k], gain[9 * k + 7]);
-        t235 = mstmm_complex_plus(t235, t234);
-    }
-    const mstmm_complex t236 = mstmm_complex_minus(S_p[42], t235);
-    S_c[42] = t236;
-    mstmm_complex t238 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t237 = mstmm_complex_times(V[n + k], gain[9 * k + 7]);
-        t238 = mstmm_complex_plus(t238, t237);
-    }
-    const mstmm_complex t239 = mstmm_complex_minus(S_p[43], t238);
-    S_c[43] = t239;
-    mstmm_complex t241 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t240 = mstmm_complex_times(V[2 * n + k], gain[9 * k + 7]);
-        t241 = mstmm_complex_plus(t241, t240);
-    }
-    const mstmm_complex t242 = mstmm_complex_minus(S_p[44], t241);
-    S_c[44] = t242;
-    mstmm_complex t244 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t243 = mstmm_complex_times(V[3 * n + k], gain[9 * k + 7]);
-        t244 = mstmm_complex_plus(t244, t243);
-    }
-    const mstmm_complex t245 = mstmm_complex_minus(S_p[45], t244);
-    S_c[45] = t245;
-    mstmm_complex t247 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t246 = mstmm_complex_times(V[4 * n + k], gain[9 * k + 7]);
-        t247 = mstmm_complex_plus(t247, t246);
-    }
-    const mstmm_complex t248 = mstmm_complex_minus(S_p[46], t247);
-    S_c[46] = t248;
-    mstmm_complex t250 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t249 = mstmm_complex_times(V[5 * n + k], gain[9 * k + 7]);
-        t250 = mstmm_complex_plus(t250, t249);
-    }
-    const mstmm_complex t251 = mstmm_complex_minus(S_p[47], t250);
-    S_c[47] = t251;
-    mstmm_complex t253 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t252 = mstmm_complex_times(V[k], gain[9 * k + 8]);
-        t253 = mstmm_complex_plus(t253, t252);
-    }
-    const mstmm_complex t254 = mstmm_complex_minus(S_p[48], t253);
-    S_c[48] = t254;
-    mstmm_complex t256 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t255 = mstmm_complex_times(V[n + k], gain[9 * k + 8]);
-        t256 = mstmm_complex_plus(t256, t255);
-    }
-    const mstmm_complex t257 = mstmm_complex_minus(S_p[49], t256);
-    S_c[49] = t257;
-    mstmm_complex t259 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t258 = mstmm_complex_times(V[2 * n + k], gain[9 * k + 8]);
-        t259 = mstmm_complex_plus(t259, t258);
-    }
-    const mstmm_complex t260 = mstmm_complex_minus(S_p[50], t259);
-    S_c[50] = t260;
-    mstmm_complex t262 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t261 = mstmm_complex_times(V[3 * n + k], gain[9 * k + 8]);
-        t262 = mstmm_complex_plus(t262, t261);
-    }
-    const mstmm_complex t263 = mstmm_complex_minus(S_p[51], t262);
-    S_c[51] = t263;
-    mstmm_complex t265 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t264 = mstmm_complex_times(V[4 * n + k], gain[9 * k + 8]);
-        t265 = mstmm_complex_plus(t265, t264);
-    }
-    const mstmm_complex t266 = mstmm_complex_minus(S_p[52], t265);
-    S_c[52] = t266;
-    mstmm_complex t268 = mstmm_complex_plain(0);
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t267 = mstmm_complex_times(V[5 * n + k], gain[9 * k + 8]);
-        t268 = mstmm_complex_plus(t268, t267);
-    }
-    const mstmm_complex t269 = mstmm_complex_minus(S_p[53], t268);
-    S_c[53] = t269;
-    if (found_gain) return 2; /* a negative determinant */
-    return 0;
-}
-
-static int mstmm_complex_sweep_tangent_placed_node(int n, const double *restrict H, const mstmm_complex *restrict V,
-    const mstmm_complex *restrict D, const mstmm_complex *restrict S_p, const mstmm_complex *restrict Z_p,
-    mstmm_complex *restrict right, mstmm_complex *restrict gain, mstmm_complex *restrict S_c, mstmm_complex *restrict work)
-{
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_complex_sweep_tangent_placed_node_sized(1, H, V, D, S_p, Z_p, right, gain, S_c, work);
-    case 2: return mstmm_complex_sweep_tangent_placed_node_sized(2, H, V, D, S_p, Z_p, right, gain, S_c, work);
-    case 3: return mstmm_complex_sweep_tangent_placed_node_sized(3, H, V, D, S_p, Z_p, right, gain, S_c, work);
-    case 4: return mstmm_complex_sweep_tangent_placed_node_sized(4, H, V, D, S_p, Z_p, right, gain, S_c, work);
-    default: return mstmm_complex_sweep_tangent_placed_node_sized(n, H, V, D, S_p, Z_p, right, gain, S_c, work);
-    }
-}
-
-/* load and rows along the unknowns by the change of pose
- * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
- * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  B_p[n][9] change of pose along the unknowns
- * in  S_p[9][6] change of the load by the pose, one row per entry
- * in  Z_p[9][n] own rows by the pose, one row per entry
- * out K[n][6], added to what is there
- * out Z_x[n][n], added to what is there
- */
-static inline __attribute__((always_inline))
-int mstmm_complex_sweep_tangent_placed_own_sized(int n, const mstmm_complex *restrict B_p, const mstmm_complex *restrict S_p,
-    const mstmm_complex *restrict Z_p, mstmm_complex *restrict K, mstmm_complex *restrict Z_x)
-{
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t0 = mstmm_complex_times(S_p[0], B_p[9 * k]);
-        const mstmm_complex t1 = mstmm_complex_times(S_p[6], B_p[9 * k + 1]);
-        const mstmm_complex t2 = mstmm_complex_plus(t0, t1);
-        const mstmm_complex t3 = mstmm_complex_times(S_p[12], B_p[9 * k + 2]);
-        const mstmm_complex t4 = mstmm_complex_plus(t2, t3);
-        const mstmm_complex t5 = mstmm_complex_times(S_p[18], B_p[9 * k + 3]);
-        const mstmm_complex t6 = mstmm_complex_plus(t4, t5);
-        const mstmm_complex t7 = mstmm_complex_times(S_p[24], B_p[9 * k + 4]);
-        const mstmm_complex t8 = mstmm_complex_plus(t6, t7);
-        const mstmm_complex t9 = mstmm_complex_times(S_p[30], B_p[9 * k + 5]);
-        const mstmm_complex t10 = mstmm_complex_plus(t8, t9);
-        const mstmm_complex t11 = mstmm_complex_times(S_p[36], B_p[9 * k + 6]);
-        const mstmm_complex t12 = mstmm_complex_plus(t10, t11);
-        const mstmm_complex t13 = mstmm_complex_times(S_p[42], B_p[9 * k + 7]);
-        const mstmm_complex t14 = mstmm_complex_plus(t12, t13);
-        const mstmm_complex t15 = mstmm_complex_times(S_p[48], B_p[9 * k + 8]);
-        const mstmm_complex t16 = mstmm_complex_plus(t14, t15);
-        K[6 * k] = mstmm_complex_plus(K[6 * k], t16);
-    }
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t17 = mstmm_complex_times(S_p[1], B_p[9 * k]);
-        const mstmm_complex t18 = mstmm_complex_times(S_p[7], B_p[9 * k + 1]);
-        const mstmm_complex t19 = mstmm_complex_plus(t17, t18);
-        const mstmm_complex t20 = mstmm_complex_times(S_p[13], B_p[9 * k + 2]);
-        const mstmm_complex t21 = mstmm_complex_plus(t19, t20);
-        const mstmm_complex t22 = mstmm_complex_times(S_p[19], B_p[9 * k + 3]);
-        const mstmm_complex t23 = mstmm_complex_plus(t21, t22);
-        const mstmm_complex t24 = mstmm_complex_times(S_p[25], B_p[9 * k + 4]);
-        const mstmm_complex t25 = mstmm_complex_plus(t23, t24);
-        const mstmm_complex t26 = mstmm_complex_times(S_p[31], B_p[9 * k + 5]);
-        const mstmm_complex t27 = mstmm_complex_plus(t25, t26);
-        const mstmm_complex t28 = mstmm_complex_times(S_p[37], B_p[9 * k + 6]);
-        const mstmm_complex t29 = mstmm_complex_plus(t27, t28);
-        const mstmm_complex t30 = mstmm_complex_times(S_p[43], B_p[9 * k + 7]);
-        const mstmm_complex t31 = mstmm_complex_plus(t29, t30);
-        const mstmm_complex t32 = mstmm_complex_times(S_p[49], B_p[9 * k + 8]);
-        const mstmm_complex t33 = mstmm_complex_plus(t31, t32);
-        K[6 * k + 1] = mstmm_complex_plus(K[6 * k + 1], t33);
-    }
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t34 = mstmm_complex_times(S_p[2], B_p[9 * k]);
-        const mstmm_complex t35 = mstmm_complex_times(S_p[8], B_p[9 * k + 1]);
-        const mstmm_complex t36 = mstmm_complex_plus(t34, t35);
-        const mstmm_complex t37 = mstmm_complex_times(S_p[14], B_p[9 * k + 2]);
-        const mstmm_complex t38 = mstmm_complex_plus(t36, t37);
-        const mstmm_complex t39 = mstmm_complex_times(S_p[20], B_p[9 * k + 3]);
-        const mstmm_complex t40 = mstmm_complex_plus(t38, t39);
-        const mstmm_complex t41 = mstmm_complex_times(S_p[26], B_p[9 * k + 4]);
-        const mstmm_complex t42 = mstmm_complex_plus(t40, t41);
-        const mstmm_complex t43 = mstmm_complex_times(S_p[32], B_p[9 * k + 5]);
-        const mstmm_complex t44 = mstmm_complex_plus(t42, t43);
-        const mstmm_complex t45 = mstmm_complex_times(S_p[38], B_p[9 * k + 6]);
-        const mstmm_complex t46 = mstmm_complex_plus(t44, t45);
-        const mstmm_complex t47 = mstmm_complex_times(S_p[44], B_p[9 * k + 7]);
-        const mstmm_complex t48 = mstmm_complex_plus(t46, t47);
-        const mstmm_complex t49 = mstmm_complex_times(S_p[50], B_p[9 * k + 8]);
-        const mstmm_complex t50 = mstmm_complex_plus(t48, t49);
-        K[6 * k + 2] = mstmm_complex_plus(K[6 * k + 2], t50);
-    }
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t51 = mstmm_complex_times(S_p[3], B_p[9 * k]);
-        const mstmm_complex t52 = mstmm_complex_times(S_p[9], B_p[9 * k + 1]);
-        const mstmm_complex t53 = mstmm_complex_plus(t51, t52);
-        const mstmm_complex t54 = mstmm_complex_times(S_p[15], B_p[9 * k + 2]);
-        const mstmm_complex t55 = mstmm_complex_plus(t53, t54);
-        const mstmm_complex t56 = mstmm_complex_times(S_p[21], B_p[9 * k + 3]);
-        const mstmm_complex t57 = mstmm_complex_plus(t55, t56);
-        const mstmm_complex t58 = mstmm_complex_times(S_p[27], B_p[9 * k + 4]);
-        const mstmm_complex t59 = mstmm_complex_plus(t57, t58);
-        const mstmm_complex t60 = mstmm_complex_times(S_p[33], B_p[9 * k + 5]);
-        const mstmm_complex t61 = mstmm_complex_plus(t59, t60);
-        const mstmm_complex t62 = mstmm_complex_times(S_p[39], B_p[9 * k + 6]);
-        const mstmm_complex t63 = mstmm_complex_plus(t61, t62);
-        const mstmm_complex t64 = mstmm_complex_times(S_p[45], B_p[9 * k + 7]);
-        const mstmm_complex t65 = mstmm_complex_plus(t63, t64);
-        const mstmm_complex t66 = mstmm_complex_times(S_p[51], B_p[9 * k + 8]);
-        const mstmm_complex t67 = mstmm_complex_plus(t65, t66);
-        K[6 * k + 3] = mstmm_complex_plus(K[6 * k + 3], t67);
-    }
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t68 = mstmm_complex_times(S_p[4], B_p[9 * k]);
-        const mstmm_complex t69 = mstmm_complex_times(S_p[10], B_p[9 * k + 1]);
-        const mstmm_complex t70 = mstmm_complex_plus(t68, t69);
-        const mstmm_complex t71 = mstmm_complex_times(S_p[16], B_p[9 * k + 2]);
-        const mstmm_complex t72 = mstmm_complex_plus(t70, t71);
-        const mstmm_complex t73 = mstmm_complex_times(S_p[22], B_p[9 * k + 3]);
-        const mstmm_complex t74 = mstmm_complex_plus(t72, t73);
-        const mstmm_complex t75 = mstmm_complex_times(S_p[28], B_p[9 * k + 4]);
-        const mstmm_complex t76 = mstmm_complex_plus(t74, t75);
-        const mstmm_complex t77 = mstmm_complex_times(S_p[34], B_p[9 * k + 5]);
-        const mstmm_complex t78 = mstmm_complex_plus(t76, t77);
-        const mstmm_complex t79 = mstmm_complex_times(S_p[40], B_p[9 * k + 6]);
-        const mstmm_complex t80 = mstmm_complex_plus(t78, t79);
-        const mstmm_complex t81 = mstmm_complex_times(S_p[46], B_p[9 * k + 7]);
-        const mstmm_complex t82 = mstmm_complex_plus(t80, t81);
-        const mstmm_complex t83 = mstmm_complex_times(S_p[52], B_p[9 * k + 8]);
-        const mstmm_complex t84 = mstmm_complex_plus(t82, t83);
-        K[6 * k + 4] = mstmm_complex_plus(K[6 * k + 4], t84);
-    }
-    for (int k = 0; k < n; ++k) {
-        const mstmm_complex t85 = mstmm_complex_times(S_p[5], B_p[9 * k]);
-        const mstmm_complex t86 = mstmm_complex_times(S_p[11], B_p[9 * k + 1]);
-        const mstmm_complex t87 = mstmm_complex_plus(t85, t86);
-        const mstmm_complex t88 = mstmm_complex_times(S_p[17], B_p[9 * k + 2]);
-        const mstmm_complex t89 = mstmm_complex_plus(t87, t88);
-        const mstmm_complex t90 = mstmm_complex_times(S_p[23], B_p[9 * k + 3]);
-        const mstmm_complex t91 = mstmm_complex_plus(t89, t90);
-        const mstmm_complex t92 = mstmm_complex_times(S_p[29], B_p[9 * k + 4]);
-        const mstmm_complex t93 = mstmm_complex_plus(t91, t92);
-        const mstmm_complex t94 = mstmm_complex_times(S_p[35], B_p[9 * k + 5]);
-        const mstmm_complex t95 = mstmm_complex_plus(t93, t94);
-        const mstmm_complex t96 = mstmm_complex_times(S_p[41], B_p[9 * k + 6]);
-        const mstmm_complex t97 = mstmm_complex_plus(t95, t96);
-        const mstmm_complex t98 = mstmm_complex_times(S_p[47], B_p[9 * k + 7]);
-        const mstmm_complex t99 = mstmm_complex_plus(t97, t98);
-        const mstmm_complex t100 = mstmm_complex_times(S_p[53], B_p[9 * k + 8]);
-        const mstmm_complex t101 = mstmm_complex_plus(t99, t100);
-        K[6 * k + 5] = mstmm_complex_plus(K[6 * k + 5], t101);
-    }
-    for (int k = 0; k < n; ++k) {
-        for (int l = 0; l < n; ++l) {
-            const mstmm_complex t102 = mstmm_complex_times(B_p[9 * k], Z_p[l]);
-            const mstmm_complex t103 = mstmm_complex_times(B_p[9 * k + 1], Z_p[n + l]);
-            const mstmm_complex t104 = mstmm_complex_plus(t102, t103);
-            const mstmm_complex t105 = mstmm_complex_times(B_p[9 * k + 2], Z_p[2 * n + l]);
-            const mstmm_complex t106 = mstmm_complex_plus(t104, t105);
-            const mstmm_complex t107 = mstmm_complex_times(B_p[9 * k + 3], Z_p[3 * n + l]);
-            const mstmm_complex t108 = mstmm_complex_plus(t106, t107);
-            const mstmm_complex t109 = mstmm_complex_times(B_p[9 * k + 4], Z_p[4 * n + l]);
-            const mstmm_complex t110 = mstmm_complex_plus(t108, t109);
-            const mstmm_complex t111 = mstmm_complex_times(B_p[9 * k + 5], Z_p[5 * n + l]);
-            const mstmm_complex t112 = mstmm_complex_plus(t110, t111);
-            const mstmm_complex t113 = mstmm_complex_times(B_p[9 * k + 6], Z_p[6 * n + l]);
-            const mstmm_complex t114 = mstmm_complex_plus(t112, t113);
-            const mstmm_complex t115 = mstmm_complex_times(B_p[9 * k + 7], Z_p[7 * n + l]);
-            const mstmm_complex t116 = mstmm_complex_plus(t114, t115);
-            const mstmm_complex t117 = mstmm_complex_times(B_p[9 * k + 8], Z_p[8 * n + l]);
-            const mstmm_complex t118 = mstmm_complex_plus(t116, t117);
-            Z_x[n * k + l] = mstmm_complex_plus(Z_x[n * k + l], t118);
-        }
-    }
-    return 0;
-}
-
-static int mstmm_complex_sweep_tangent_placed_own(int n, const mstmm_complex *restrict B_p, const mstmm_complex *restrict S_p,
-    const mstmm_complex *restrict Z_p, mstmm_complex *restrict K, mstmm_complex *restrict Z_x)
-{
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_complex_sweep_tangent_placed_own_sized(1, B_p, S_p, Z_p, K, Z_x);
-    case 2: return mstmm_complex_sweep_tangent_placed_own_sized(2, B_p, S_p, Z_p, K, Z_x);
-    case 3: return mstmm_complex_sweep_tangent_placed_own_sized(3, B_p, S_p, Z_p, K, Z_x);
-    case 4: return mstmm_complex_sweep_tangent_placed_own_sized(4, B_p, S_p, Z_p, K, Z_x);
-    default: return mstmm_complex_sweep_tangent_placed_own_sized(n, B_p, S_p, Z_p, K, Z_x);
+    case 1: return mstmm_complex_sweep_tangent_placed_port_sized(1, Rc, r, H, B_p, S_p, T_p, K, Z_p, Z_x);
+    case 2: return mstmm_complex_sweep_tangent_placed_port_sized(2, Rc, r, H, B_p, S_p, T_p, K, Z_p, Z_x);
+    case 3: return mstmm_complex_sweep_tangent_placed_port_sized(3, Rc, r, H, B_p, S_p, T_p, K, Z_p, Z_x);
+    case 4: return mstmm_complex_sweep_tangent_placed_port_sized(4, Rc, r, H, B_p, S_p, T_p, K, Z_p, Z_x);
+    default: return mstmm_complex_sweep_tangent_placed_port_sized(n, Rc, r, H, B_p, S_p, T_p, K, Z_p, Z_x);
     }
 }
 
@@ -19609,6 +19569,53 @@ static int mstmm_complex_sweep_tangent_placed_reduce(int n, const mstmm_complex 
     }
 }
 
+/* rows less their change by the change of pose
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  gain[n][9] D^-1 times the rows by the pose
+ * in  p[9] change of pose: rotation, position and velocity of P, own axes
+ * out y[n] the remainder of the rows, added to what is there
+ */
+static inline __attribute__((always_inline))
+int mstmm_complex_sweep_tangent_placed_remainder_sized(int n, const mstmm_complex *restrict gain,
+    const mstmm_complex *restrict p, mstmm_complex *restrict y)
+{
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t0 = mstmm_complex_times(p[0], gain[9 * k]);
+        const mstmm_complex t1 = mstmm_complex_times(p[1], gain[9 * k + 1]);
+        const mstmm_complex t2 = mstmm_complex_plus(t0, t1);
+        const mstmm_complex t3 = mstmm_complex_times(p[2], gain[9 * k + 2]);
+        const mstmm_complex t4 = mstmm_complex_plus(t2, t3);
+        const mstmm_complex t5 = mstmm_complex_times(p[3], gain[9 * k + 3]);
+        const mstmm_complex t6 = mstmm_complex_plus(t4, t5);
+        const mstmm_complex t7 = mstmm_complex_times(p[4], gain[9 * k + 4]);
+        const mstmm_complex t8 = mstmm_complex_plus(t6, t7);
+        const mstmm_complex t9 = mstmm_complex_times(p[5], gain[9 * k + 5]);
+        const mstmm_complex t10 = mstmm_complex_plus(t8, t9);
+        const mstmm_complex t11 = mstmm_complex_times(p[6], gain[9 * k + 6]);
+        const mstmm_complex t12 = mstmm_complex_plus(t10, t11);
+        const mstmm_complex t13 = mstmm_complex_times(p[7], gain[9 * k + 7]);
+        const mstmm_complex t14 = mstmm_complex_plus(t12, t13);
+        const mstmm_complex t15 = mstmm_complex_times(p[8], gain[9 * k + 8]);
+        const mstmm_complex t16 = mstmm_complex_plus(t14, t15);
+        const mstmm_complex t17 = mstmm_complex_scaled(-1, t16);
+        y[k] = mstmm_complex_plus(y[k], t17);
+    }
+    return 0;
+}
+
+static int mstmm_complex_sweep_tangent_placed_remainder(int n, const mstmm_complex *restrict gain, const mstmm_complex *restrict p,
+    mstmm_complex *restrict y)
+{
+    switch (n) { /* loops over a known number are unrolled */
+    case 1: return mstmm_complex_sweep_tangent_placed_remainder_sized(1, gain, p, y);
+    case 2: return mstmm_complex_sweep_tangent_placed_remainder_sized(2, gain, p, y);
+    case 3: return mstmm_complex_sweep_tangent_placed_remainder_sized(3, gain, p, y);
+    case 4: return mstmm_complex_sweep_tangent_placed_remainder_sized(4, gain, p, y);
+    default: return mstmm_complex_sweep_tangent_placed_remainder_sized(n, gain, p, y);
+    }
+}
+
 /* rows of a hinge by the change of pose
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
@@ -19761,99 +19768,93 @@ static int mstmm_complex_sweep_tangent_placed_rows(int n, const double *restrict
     }
 }
 
-/* unknowns eliminated from a right-hand side
+/* change of motion with the unknowns' part
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
- * in  H[6][n] motion subspace of the unknowns
- * in  V[6][n] K + G
- * in  D[n][n] rows by unknowns
- * in  e[6] (N, N*m) force part of f = S a + e, at P
- * in  e_f[n] load of the rows
- * out rest[n] the remainder of the rows
- * out y[n] D^-1 times the remainder of the rows
- * out e_c[6] (N, N*m) load without the unknowns
- * out work[n][n] factor L, D of solve
+ * in  B[n][9] motion along the unknowns
+ * in  x[n] unknowns
+ * in  z_c[9] change of motion without the unknowns' part
+ * out z[9] change of the body's motion, own axes
  */
 static inline __attribute__((always_inline))
-int mstmm_complex_sweep_tangent_push_sized(int n, const double *restrict H, const mstmm_complex *restrict V,
-    const mstmm_complex *restrict D, const mstmm_complex *restrict e, const mstmm_complex *restrict e_f, mstmm_complex *restrict rest,
-    mstmm_complex *restrict y, mstmm_complex *restrict e_c, mstmm_complex *restrict work)
+int mstmm_complex_sweep_tangent_port_motion_sized(int n, const mstmm_complex *restrict B, const mstmm_complex *restrict x,
+    const mstmm_complex *restrict z_c, mstmm_complex *restrict z)
 {
+    mstmm_complex t1 = mstmm_complex_plain(0);
     for (int k = 0; k < n; ++k) {
-        const mstmm_complex t0 = mstmm_complex_scaled(H[k], e[0]);
-        const mstmm_complex t1 = mstmm_complex_scaled(H[n + k], e[1]);
-        const mstmm_complex t2 = mstmm_complex_plus(t0, t1);
-        const mstmm_complex t3 = mstmm_complex_scaled(H[2 * n + k], e[2]);
-        const mstmm_complex t4 = mstmm_complex_plus(t2, t3);
-        const mstmm_complex t5 = mstmm_complex_scaled(H[3 * n + k], e[3]);
-        const mstmm_complex t6 = mstmm_complex_plus(t4, t5);
-        const mstmm_complex t7 = mstmm_complex_scaled(H[4 * n + k], e[4]);
-        const mstmm_complex t8 = mstmm_complex_plus(t6, t7);
-        const mstmm_complex t9 = mstmm_complex_scaled(H[5 * n + k], e[5]);
-        const mstmm_complex t10 = mstmm_complex_plus(t8, t9);
-        const mstmm_complex t11 = mstmm_complex_plus(e_f[k], t10);
-        const mstmm_complex t12 = mstmm_complex_scaled(-1, t11);
-        rest[k] = t12;
+        const mstmm_complex t0 = mstmm_complex_times(B[9 * k], x[k]);
+        t1 = mstmm_complex_plus(t1, t0);
     }
-    /* a pivot of D vanishes: a motion is undetermined */
-    const int found_y = mstmm_complex_solve_lu(n, 1, D, rest, y, work, 1e-13);
-    if (found_y == 1) return 1;
-    mstmm_complex t14 = mstmm_complex_plain(0);
+    const mstmm_complex t2 = mstmm_complex_plus(z_c[0], t1);
+    z[0] = t2;
+    mstmm_complex t4 = mstmm_complex_plain(0);
     for (int k = 0; k < n; ++k) {
-        const mstmm_complex t13 = mstmm_complex_times(V[k], y[k]);
-        t14 = mstmm_complex_plus(t14, t13);
+        const mstmm_complex t3 = mstmm_complex_times(x[k], B[9 * k + 1]);
+        t4 = mstmm_complex_plus(t4, t3);
     }
-    const mstmm_complex t15 = mstmm_complex_plus(e[0], t14);
-    e_c[0] = t15;
-    mstmm_complex t17 = mstmm_complex_plain(0);
+    const mstmm_complex t5 = mstmm_complex_plus(z_c[1], t4);
+    z[1] = t5;
+    mstmm_complex t7 = mstmm_complex_plain(0);
     for (int k = 0; k < n; ++k) {
-        const mstmm_complex t16 = mstmm_complex_times(y[k], V[n + k]);
-        t17 = mstmm_complex_plus(t17, t16);
+        const mstmm_complex t6 = mstmm_complex_times(x[k], B[9 * k + 2]);
+        t7 = mstmm_complex_plus(t7, t6);
     }
-    const mstmm_complex t18 = mstmm_complex_plus(e[1], t17);
-    e_c[1] = t18;
-    mstmm_complex t20 = mstmm_complex_plain(0);
+    const mstmm_complex t8 = mstmm_complex_plus(z_c[2], t7);
+    z[2] = t8;
+    mstmm_complex t10 = mstmm_complex_plain(0);
     for (int k = 0; k < n; ++k) {
-        const mstmm_complex t19 = mstmm_complex_times(y[k], V[2 * n + k]);
-        t20 = mstmm_complex_plus(t20, t19);
+        const mstmm_complex t9 = mstmm_complex_times(x[k], B[9 * k + 3]);
+        t10 = mstmm_complex_plus(t10, t9);
     }
-    const mstmm_complex t21 = mstmm_complex_plus(e[2], t20);
-    e_c[2] = t21;
-    mstmm_complex t23 = mstmm_complex_plain(0);
+    const mstmm_complex t11 = mstmm_complex_plus(z_c[3], t10);
+    z[3] = t11;
+    mstmm_complex t13 = mstmm_complex_plain(0);
     for (int k = 0; k < n; ++k) {
-        const mstmm_complex t22 = mstmm_complex_times(y[k], V[3 * n + k]);
-        t23 = mstmm_complex_plus(t23, t22);
+        const mstmm_complex t12 = mstmm_complex_times(x[k], B[9 * k + 4]);
+        t13 = mstmm_complex_plus(t13, t12);
     }
-    const mstmm_complex t24 = mstmm_complex_plus(e[3], t23);
-    e_c[3] = t24;
-    mstmm_complex t26 = mstmm_complex_plain(0);
+    const mstmm_complex t14 = mstmm_complex_plus(z_c[4], t13);
+    z[4] = t14;
+    mstmm_complex t16 = mstmm_complex_plain(0);
     for (int k = 0; k < n; ++k) {
-        const mstmm_complex t25 = mstmm_complex_times(y[k], V[4 * n + k]);
-        t26 = mstmm_complex_plus(t26, t25);
+        const mstmm_complex t15 = mstmm_complex_times(x[k], B[9 * k + 5]);
+        t16 = mstmm_complex_plus(t16, t15);
     }
-    const mstmm_complex t27 = mstmm_complex_plus(e[4], t26);
-    e_c[4] = t27;
-    mstmm_complex t29 = mstmm_complex_plain(0);
+    const mstmm_complex t17 = mstmm_complex_plus(z_c[5], t16);
+    z[5] = t17;
+    mstmm_complex t19 = mstmm_complex_plain(0);
     for (int k = 0; k < n; ++k) {
-        const mstmm_complex t28 = mstmm_complex_times(y[k], V[5 * n + k]);
-        t29 = mstmm_complex_plus(t29, t28);
+        const mstmm_complex t18 = mstmm_complex_times(x[k], B[9 * k + 6]);
+        t19 = mstmm_complex_plus(t19, t18);
     }
-    const mstmm_complex t30 = mstmm_complex_plus(e[5], t29);
-    e_c[5] = t30;
-    if (found_y) return 2; /* a negative determinant */
+    const mstmm_complex t20 = mstmm_complex_plus(z_c[6], t19);
+    z[6] = t20;
+    mstmm_complex t22 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t21 = mstmm_complex_times(x[k], B[9 * k + 7]);
+        t22 = mstmm_complex_plus(t22, t21);
+    }
+    const mstmm_complex t23 = mstmm_complex_plus(z_c[7], t22);
+    z[7] = t23;
+    mstmm_complex t25 = mstmm_complex_plain(0);
+    for (int k = 0; k < n; ++k) {
+        const mstmm_complex t24 = mstmm_complex_times(x[k], B[9 * k + 8]);
+        t25 = mstmm_complex_plus(t25, t24);
+    }
+    const mstmm_complex t26 = mstmm_complex_plus(z_c[8], t25);
+    z[8] = t26;
     return 0;
 }
 
-static int mstmm_complex_sweep_tangent_push(int n, const double *restrict H, const mstmm_complex *restrict V,
-    const mstmm_complex *restrict D, const mstmm_complex *restrict e, const mstmm_complex *restrict e_f, mstmm_complex *restrict rest,
-    mstmm_complex *restrict y, mstmm_complex *restrict e_c, mstmm_complex *restrict work)
+static int mstmm_complex_sweep_tangent_port_motion(int n, const mstmm_complex *restrict B, const mstmm_complex *restrict x,
+    const mstmm_complex *restrict z_c, mstmm_complex *restrict z)
 {
     switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_complex_sweep_tangent_push_sized(1, H, V, D, e, e_f, rest, y, e_c, work);
-    case 2: return mstmm_complex_sweep_tangent_push_sized(2, H, V, D, e, e_f, rest, y, e_c, work);
-    case 3: return mstmm_complex_sweep_tangent_push_sized(3, H, V, D, e, e_f, rest, y, e_c, work);
-    case 4: return mstmm_complex_sweep_tangent_push_sized(4, H, V, D, e, e_f, rest, y, e_c, work);
-    default: return mstmm_complex_sweep_tangent_push_sized(n, H, V, D, e, e_f, rest, y, e_c, work);
+    case 1: return mstmm_complex_sweep_tangent_port_motion_sized(1, B, x, z_c, z);
+    case 2: return mstmm_complex_sweep_tangent_port_motion_sized(2, B, x, z_c, z);
+    case 3: return mstmm_complex_sweep_tangent_port_motion_sized(3, B, x, z_c, z);
+    case 4: return mstmm_complex_sweep_tangent_port_motion_sized(4, B, x, z_c, z);
+    default: return mstmm_complex_sweep_tangent_port_motion_sized(n, B, x, z_c, z);
     }
 }
 
@@ -19873,19 +19874,19 @@ static inline int mstmm_complex_frames_placed_carry_by(struct mstmm_complex_fram
 }
 #define mstmm_complex_frames_placed_carry(...) mstmm_complex_frames_placed_carry_by((struct mstmm_complex_frames_placed_carry){__VA_ARGS__})
 
-struct mstmm_complex_frames_placed_moved {
+struct mstmm_complex_frames_placed_displacement {
     const double *Rc;
     const double *r;
     const mstmm_complex *z_I;
     const mstmm_complex *p_I;
     mstmm_complex *p;
 };
-static inline int mstmm_complex_frames_placed_moved_by(struct mstmm_complex_frames_placed_moved to)
+static inline int mstmm_complex_frames_placed_displacement_by(struct mstmm_complex_frames_placed_displacement to)
 {
-    return mstmm_complex_sweep_frames_placed_moved(
+    return mstmm_complex_sweep_frames_placed_displacement(
         to.Rc, to.r, to.z_I, to.p_I, to.p);
 }
-#define mstmm_complex_frames_placed_moved(...) mstmm_complex_frames_placed_moved_by((struct mstmm_complex_frames_placed_moved){__VA_ARGS__})
+#define mstmm_complex_frames_placed_displacement(...) mstmm_complex_frames_placed_displacement_by((struct mstmm_complex_frames_placed_displacement){__VA_ARGS__})
 
 struct mstmm_complex_frames_tangent_carry {
     const double *Rc;
@@ -19904,7 +19905,7 @@ static inline int mstmm_complex_frames_tangent_carry_by(struct mstmm_complex_fra
 }
 #define mstmm_complex_frames_tangent_carry(...) mstmm_complex_frames_tangent_carry_by((struct mstmm_complex_frames_tangent_carry){__VA_ARGS__})
 
-struct mstmm_complex_frames_tangent_moved {
+struct mstmm_complex_frames_tangent_motion {
     const double *Rc;
     const double *r;
     const double *w_I;
@@ -19913,12 +19914,12 @@ struct mstmm_complex_frames_tangent_moved {
     const mstmm_complex *z_I;
     mstmm_complex *z;
 };
-static inline int mstmm_complex_frames_tangent_moved_by(struct mstmm_complex_frames_tangent_moved to)
+static inline int mstmm_complex_frames_tangent_motion_by(struct mstmm_complex_frames_tangent_motion to)
 {
-    return mstmm_complex_sweep_frames_tangent_moved(
+    return mstmm_complex_sweep_frames_tangent_motion(
         to.Rc, to.r, to.w_I, to.v, to.w, to.z_I, to.z);
 }
-#define mstmm_complex_frames_tangent_moved(...) mstmm_complex_frames_tangent_moved_by((struct mstmm_complex_frames_tangent_moved){__VA_ARGS__})
+#define mstmm_complex_frames_tangent_motion(...) mstmm_complex_frames_tangent_motion_by((struct mstmm_complex_frames_tangent_motion){__VA_ARGS__})
 
 struct mstmm_complex_frames_transport {
     const double *Rc;
@@ -19933,32 +19934,7 @@ static inline int mstmm_complex_frames_transport_by(struct mstmm_complex_frames_
 }
 #define mstmm_complex_frames_transport(...) mstmm_complex_frames_transport_by((struct mstmm_complex_frames_transport){__VA_ARGS__})
 
-struct mstmm_complex_generic_tangent_answer {
-    const double *Rc;
-    const double *r;
-    const double *w_I;
-    const double *v;
-    const double *w;
-    const mstmm_complex *z_I;
-    const mstmm_complex *B;
-    const mstmm_complex *gain;
-    const mstmm_complex *y;
-    mstmm_complex *x;
-    mstmm_complex *z;
-};
-typedef int mstmm_complex_generic_tangent_answer_kernel(
-    const double *restrict, const double *restrict, const double *restrict,
-    const double *restrict, const double *restrict, const mstmm_complex *restrict, const mstmm_complex *restrict,
-    const mstmm_complex *restrict, const mstmm_complex *restrict, mstmm_complex *restrict, mstmm_complex *restrict);
-static mstmm_complex_generic_tangent_answer_kernel *const mstmm_complex_generic_tangent_answer_table[7];
-static inline int mstmm_complex_generic_tangent_answer_by(int speeds, struct mstmm_complex_generic_tangent_answer to)
-{
-    return mstmm_complex_generic_tangent_answer_table[speeds](
-        to.Rc, to.r, to.w_I, to.v, to.w, to.z_I, to.B, to.gain, to.y, to.x, to.z);
-}
-#define mstmm_complex_generic_tangent_answer(speeds, ...) mstmm_complex_generic_tangent_answer_by(speeds, (struct mstmm_complex_generic_tangent_answer){__VA_ARGS__})
-
-struct mstmm_complex_generic_tangent_push {
+struct mstmm_complex_generic_tangent_load {
     const double *Rc;
     const double *r;
     const double *H;
@@ -19969,17 +19945,17 @@ struct mstmm_complex_generic_tangent_push {
     mstmm_complex *y;
     mstmm_complex *e_I;
 };
-typedef int mstmm_complex_generic_tangent_push_kernel(
+typedef int mstmm_complex_generic_tangent_load_kernel(
     const double *restrict, const double *restrict, const double *restrict, const mstmm_complex *restrict,
     const mstmm_complex *restrict, const mstmm_complex *restrict, const mstmm_complex *restrict, mstmm_complex *restrict,
     mstmm_complex *restrict);
-static mstmm_complex_generic_tangent_push_kernel *const mstmm_complex_generic_tangent_push_table[7];
-static inline int mstmm_complex_generic_tangent_push_by(int speeds, struct mstmm_complex_generic_tangent_push to)
+static mstmm_complex_generic_tangent_load_kernel *const mstmm_complex_generic_tangent_load_table[7];
+static inline int mstmm_complex_generic_tangent_load_by(int speeds, struct mstmm_complex_generic_tangent_load to)
 {
-    return mstmm_complex_generic_tangent_push_table[speeds](
+    return mstmm_complex_generic_tangent_load_table[speeds](
         to.Rc, to.r, to.H, to.V, to.inverse, to.e, to.e_f, to.y, to.e_I);
 }
-#define mstmm_complex_generic_tangent_push(speeds, ...) mstmm_complex_generic_tangent_push_by(speeds, (struct mstmm_complex_generic_tangent_push){__VA_ARGS__})
+#define mstmm_complex_generic_tangent_load(speeds, ...) mstmm_complex_generic_tangent_load_by(speeds, (struct mstmm_complex_generic_tangent_load){__VA_ARGS__})
 
 struct mstmm_complex_generic_tangent_reduce {
     const mstmm_complex *inverse;
@@ -20022,6 +19998,31 @@ static inline int mstmm_complex_generic_tangent_rows_by(int speeds, struct mstmm
 }
 #define mstmm_complex_generic_tangent_rows(speeds, ...) mstmm_complex_generic_tangent_rows_by(speeds, (struct mstmm_complex_generic_tangent_rows){__VA_ARGS__})
 
+struct mstmm_complex_generic_tangent_solution {
+    const double *Rc;
+    const double *r;
+    const double *w_I;
+    const double *v;
+    const double *w;
+    const mstmm_complex *z_I;
+    const mstmm_complex *B;
+    const mstmm_complex *gain;
+    const mstmm_complex *y;
+    mstmm_complex *x;
+    mstmm_complex *z;
+};
+typedef int mstmm_complex_generic_tangent_solution_kernel(
+    const double *restrict, const double *restrict, const double *restrict,
+    const double *restrict, const double *restrict, const mstmm_complex *restrict, const mstmm_complex *restrict,
+    const mstmm_complex *restrict, const mstmm_complex *restrict, mstmm_complex *restrict, mstmm_complex *restrict);
+static mstmm_complex_generic_tangent_solution_kernel *const mstmm_complex_generic_tangent_solution_table[7];
+static inline int mstmm_complex_generic_tangent_solution_by(int speeds, struct mstmm_complex_generic_tangent_solution to)
+{
+    return mstmm_complex_generic_tangent_solution_table[speeds](
+        to.Rc, to.r, to.w_I, to.v, to.w, to.z_I, to.B, to.gain, to.y, to.x, to.z);
+}
+#define mstmm_complex_generic_tangent_solution(speeds, ...) mstmm_complex_generic_tangent_solution_by(speeds, (struct mstmm_complex_generic_tangent_solution){__VA_ARGS__})
+
 struct mstmm_complex_modal_modal_effort {
     int n;
     const double *H;
@@ -20036,7 +20037,7 @@ static inline int mstmm_complex_modal_modal_effort_by(struct mstmm_complex_modal
 }
 #define mstmm_complex_modal_modal_effort(...) mstmm_complex_modal_modal_effort_by((struct mstmm_complex_modal_modal_effort){__VA_ARGS__})
 
-struct mstmm_complex_tangent_absorb {
+struct mstmm_complex_tangent_assemble_port {
     int n;
     const double *Rc;
     const double *r;
@@ -20051,14 +20052,33 @@ struct mstmm_complex_tangent_absorb {
     mstmm_complex *Z_z;
     mstmm_complex *Z_x;
 };
-static inline int mstmm_complex_tangent_absorb_by(struct mstmm_complex_tangent_absorb to)
+static inline int mstmm_complex_tangent_assemble_port_by(struct mstmm_complex_tangent_assemble_port to)
 {
-    return mstmm_complex_sweep_tangent_absorb(
+    return mstmm_complex_sweep_tangent_assemble_port(
         to.n, to.Rc, to.r, to.H, to.B, to.G, to.W, to.S, to.T, to.K_x, to.K, to.Z_z, to.Z_x);
 }
-#define mstmm_complex_tangent_absorb(...) mstmm_complex_tangent_absorb_by((struct mstmm_complex_tangent_absorb){__VA_ARGS__})
+#define mstmm_complex_tangent_assemble_port(...) mstmm_complex_tangent_assemble_port_by((struct mstmm_complex_tangent_assemble_port){__VA_ARGS__})
 
-struct mstmm_complex_tangent_answer {
+struct mstmm_complex_tangent_column_load {
+    int n;
+    const double *H;
+    const mstmm_complex *V;
+    const mstmm_complex *D;
+    const mstmm_complex *e;
+    const mstmm_complex *e_f;
+    mstmm_complex *rest;
+    mstmm_complex *y;
+    mstmm_complex *e_c;
+    mstmm_complex *work;
+};
+static inline int mstmm_complex_tangent_column_load_by(struct mstmm_complex_tangent_column_load to)
+{
+    return mstmm_complex_sweep_tangent_column_load(
+        to.n, to.H, to.V, to.D, to.e, to.e_f, to.rest, to.y, to.e_c, to.work);
+}
+#define mstmm_complex_tangent_column_load(...) mstmm_complex_tangent_column_load_by((struct mstmm_complex_tangent_column_load){__VA_ARGS__})
+
+struct mstmm_complex_tangent_column_solution {
     int n;
     const mstmm_complex *B;
     const mstmm_complex *gain;
@@ -20067,26 +20087,12 @@ struct mstmm_complex_tangent_answer {
     mstmm_complex *x;
     mstmm_complex *z;
 };
-static inline int mstmm_complex_tangent_answer_by(struct mstmm_complex_tangent_answer to)
+static inline int mstmm_complex_tangent_column_solution_by(struct mstmm_complex_tangent_column_solution to)
 {
-    return mstmm_complex_sweep_tangent_answer(
+    return mstmm_complex_sweep_tangent_column_solution(
         to.n, to.B, to.gain, to.y, to.z_c, to.x, to.z);
 }
-#define mstmm_complex_tangent_answer(...) mstmm_complex_tangent_answer_by((struct mstmm_complex_tangent_answer){__VA_ARGS__})
-
-struct mstmm_complex_tangent_displaced {
-    int n;
-    const mstmm_complex *B;
-    const mstmm_complex *x;
-    const mstmm_complex *z_c;
-    mstmm_complex *z;
-};
-static inline int mstmm_complex_tangent_displaced_by(struct mstmm_complex_tangent_displaced to)
-{
-    return mstmm_complex_sweep_tangent_displaced(
-        to.n, to.B, to.x, to.z_c, to.z);
-}
-#define mstmm_complex_tangent_displaced(...) mstmm_complex_tangent_displaced_by((struct mstmm_complex_tangent_displaced){__VA_ARGS__})
+#define mstmm_complex_tangent_column_solution(...) mstmm_complex_tangent_column_solution_by((struct mstmm_complex_tangent_column_solution){__VA_ARGS__})
 
 struct mstmm_complex_tangent_invert {
     int n;
@@ -20127,38 +20133,6 @@ static inline int mstmm_complex_tangent_node_by(struct mstmm_complex_tangent_nod
 }
 #define mstmm_complex_tangent_node(...) mstmm_complex_tangent_node_by((struct mstmm_complex_tangent_node){__VA_ARGS__})
 
-struct mstmm_complex_tangent_placed_absorb {
-    int n;
-    const double *Rc;
-    const double *r;
-    const double *H;
-    const mstmm_complex *B_p;
-    const mstmm_complex *S_p;
-    const mstmm_complex *T_p;
-    mstmm_complex *K;
-    mstmm_complex *Z_p;
-    mstmm_complex *Z_x;
-};
-static inline int mstmm_complex_tangent_placed_absorb_by(struct mstmm_complex_tangent_placed_absorb to)
-{
-    return mstmm_complex_sweep_tangent_placed_absorb(
-        to.n, to.Rc, to.r, to.H, to.B_p, to.S_p, to.T_p, to.K, to.Z_p, to.Z_x);
-}
-#define mstmm_complex_tangent_placed_absorb(...) mstmm_complex_tangent_placed_absorb_by((struct mstmm_complex_tangent_placed_absorb){__VA_ARGS__})
-
-struct mstmm_complex_tangent_placed_left {
-    int n;
-    const mstmm_complex *gain;
-    const mstmm_complex *p;
-    mstmm_complex *y;
-};
-static inline int mstmm_complex_tangent_placed_left_by(struct mstmm_complex_tangent_placed_left to)
-{
-    return mstmm_complex_sweep_tangent_placed_left(
-        to.n, to.gain, to.p, to.y);
-}
-#define mstmm_complex_tangent_placed_left(...) mstmm_complex_tangent_placed_left_by((struct mstmm_complex_tangent_placed_left){__VA_ARGS__})
-
 struct mstmm_complex_tangent_placed_node {
     int n;
     const double *H;
@@ -20193,6 +20167,25 @@ static inline int mstmm_complex_tangent_placed_own_by(struct mstmm_complex_tange
 }
 #define mstmm_complex_tangent_placed_own(...) mstmm_complex_tangent_placed_own_by((struct mstmm_complex_tangent_placed_own){__VA_ARGS__})
 
+struct mstmm_complex_tangent_placed_port {
+    int n;
+    const double *Rc;
+    const double *r;
+    const double *H;
+    const mstmm_complex *B_p;
+    const mstmm_complex *S_p;
+    const mstmm_complex *T_p;
+    mstmm_complex *K;
+    mstmm_complex *Z_p;
+    mstmm_complex *Z_x;
+};
+static inline int mstmm_complex_tangent_placed_port_by(struct mstmm_complex_tangent_placed_port to)
+{
+    return mstmm_complex_sweep_tangent_placed_port(
+        to.n, to.Rc, to.r, to.H, to.B_p, to.S_p, to.T_p, to.K, to.Z_p, to.Z_x);
+}
+#define mstmm_complex_tangent_placed_port(...) mstmm_complex_tangent_placed_port_by((struct mstmm_complex_tangent_placed_port){__VA_ARGS__})
+
 struct mstmm_complex_tangent_placed_reduce {
     int n;
     const mstmm_complex *inverse;
@@ -20208,6 +20201,19 @@ static inline int mstmm_complex_tangent_placed_reduce_by(struct mstmm_complex_ta
 }
 #define mstmm_complex_tangent_placed_reduce(...) mstmm_complex_tangent_placed_reduce_by((struct mstmm_complex_tangent_placed_reduce){__VA_ARGS__})
 
+struct mstmm_complex_tangent_placed_remainder {
+    int n;
+    const mstmm_complex *gain;
+    const mstmm_complex *p;
+    mstmm_complex *y;
+};
+static inline int mstmm_complex_tangent_placed_remainder_by(struct mstmm_complex_tangent_placed_remainder to)
+{
+    return mstmm_complex_sweep_tangent_placed_remainder(
+        to.n, to.gain, to.p, to.y);
+}
+#define mstmm_complex_tangent_placed_remainder(...) mstmm_complex_tangent_placed_remainder_by((struct mstmm_complex_tangent_placed_remainder){__VA_ARGS__})
+
 struct mstmm_complex_tangent_placed_rows {
     int n;
     const double *H;
@@ -20221,24 +20227,19 @@ static inline int mstmm_complex_tangent_placed_rows_by(struct mstmm_complex_tang
 }
 #define mstmm_complex_tangent_placed_rows(...) mstmm_complex_tangent_placed_rows_by((struct mstmm_complex_tangent_placed_rows){__VA_ARGS__})
 
-struct mstmm_complex_tangent_push {
+struct mstmm_complex_tangent_port_motion {
     int n;
-    const double *H;
-    const mstmm_complex *V;
-    const mstmm_complex *D;
-    const mstmm_complex *e;
-    const mstmm_complex *e_f;
-    mstmm_complex *rest;
-    mstmm_complex *y;
-    mstmm_complex *e_c;
-    mstmm_complex *work;
+    const mstmm_complex *B;
+    const mstmm_complex *x;
+    const mstmm_complex *z_c;
+    mstmm_complex *z;
 };
-static inline int mstmm_complex_tangent_push_by(struct mstmm_complex_tangent_push to)
+static inline int mstmm_complex_tangent_port_motion_by(struct mstmm_complex_tangent_port_motion to)
 {
-    return mstmm_complex_sweep_tangent_push(
-        to.n, to.H, to.V, to.D, to.e, to.e_f, to.rest, to.y, to.e_c, to.work);
+    return mstmm_complex_sweep_tangent_port_motion(
+        to.n, to.B, to.x, to.z_c, to.z);
 }
-#define mstmm_complex_tangent_push(...) mstmm_complex_tangent_push_by((struct mstmm_complex_tangent_push){__VA_ARGS__})
+#define mstmm_complex_tangent_port_motion(...) mstmm_complex_tangent_port_motion_by((struct mstmm_complex_tangent_port_motion){__VA_ARGS__})
 
 static mstmm_complex_generic_tangent_rows_kernel *const mstmm_complex_generic_tangent_rows_table[] = {
     NULL,
@@ -20260,32 +20261,32 @@ static mstmm_complex_generic_tangent_reduce_kernel *const mstmm_complex_generic_
     mstmm_complex_sweep_generic6_tangent_reduce,
 };
 
-static mstmm_complex_generic_tangent_push_kernel *const mstmm_complex_generic_tangent_push_table[] = {
+static mstmm_complex_generic_tangent_load_kernel *const mstmm_complex_generic_tangent_load_table[] = {
     NULL,
-    mstmm_complex_sweep_generic1_tangent_push,
-    mstmm_complex_sweep_generic2_tangent_push,
-    mstmm_complex_sweep_generic3_tangent_push,
-    mstmm_complex_sweep_generic4_tangent_push,
-    mstmm_complex_sweep_generic5_tangent_push,
-    mstmm_complex_sweep_generic6_tangent_push,
+    mstmm_complex_sweep_generic1_tangent_load,
+    mstmm_complex_sweep_generic2_tangent_load,
+    mstmm_complex_sweep_generic3_tangent_load,
+    mstmm_complex_sweep_generic4_tangent_load,
+    mstmm_complex_sweep_generic5_tangent_load,
+    mstmm_complex_sweep_generic6_tangent_load,
 };
 
-static mstmm_complex_generic_tangent_answer_kernel *const mstmm_complex_generic_tangent_answer_table[] = {
+static mstmm_complex_generic_tangent_solution_kernel *const mstmm_complex_generic_tangent_solution_table[] = {
     NULL,
-    mstmm_complex_sweep_generic1_tangent_answer,
-    mstmm_complex_sweep_generic2_tangent_answer,
-    mstmm_complex_sweep_generic3_tangent_answer,
-    mstmm_complex_sweep_generic4_tangent_answer,
-    mstmm_complex_sweep_generic5_tangent_answer,
-    mstmm_complex_sweep_generic6_tangent_answer,
+    mstmm_complex_sweep_generic1_tangent_solution,
+    mstmm_complex_sweep_generic2_tangent_solution,
+    mstmm_complex_sweep_generic3_tangent_solution,
+    mstmm_complex_sweep_generic4_tangent_solution,
+    mstmm_complex_sweep_generic5_tangent_solution,
+    mstmm_complex_sweep_generic6_tangent_solution,
 };
 
-static int mstmm_complex_at_tangent_eliminated(mstmm_complex_state *state, int index);
+static int mstmm_complex_at_tangent_elimination(mstmm_complex_state *state, int index);
 static int mstmm_complex_at_tangent_column(mstmm_complex_state *state, int index);
-static int mstmm_complex_at_tangent_carried(mstmm_complex_state *state, int index);
-static int mstmm_complex_at_tangent_answered(mstmm_complex_state *state, int index);
+static int mstmm_complex_at_tangent_backward(mstmm_complex_state *state, int index);
+static int mstmm_complex_at_tangent_forward(mstmm_complex_state *state, int index);
 /* Unknowns of a body eliminated from its contribution. */
-static int mstmm_complex_at_tangent_eliminated(mstmm_complex_state *state, int index)
+static int mstmm_complex_at_tangent_elimination(mstmm_complex_state *state, int index)
 {
     mstmm_complex S_c[54];
     mstmm_complex S_p[54];
@@ -20303,7 +20304,7 @@ static int mstmm_complex_at_tangent_eliminated(mstmm_complex_state *state, int i
     int columns[6];
     const int speeds = mstmm_free_speeds(state->memory, body, columns);
     int code;
-    if (mstmm_aside(state->model, state->observed, index)) return 0;
+    if (mstmm_omitted(state->model, state->observed, index)) return 0;
     if (body->modal && body->section && body->placed) {
         mstmm_complex *place = state->tangents->numbers + body->place;
         const mstmm_modal *modal = mstmm_modal_of(body);
@@ -20336,7 +20337,7 @@ static int mstmm_complex_at_tangent_eliminated(mstmm_complex_state *state, int i
         const int n = mstmm_modes_of(modal);
         mstmm_complex *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
         code = mstmm_complex_judged(state, mstmm_complex_tangent_node(
-            .n = modal->n, .H = state->tangents->held + modal->tangent + MSTMM_BEND_STILL(n), .B = bend + MSTMM_BEND_B(n),
+            .n = modal->n, .H = state->tangents->held + modal->tangent + MSTMM_BEND_ZERO_H(n), .B = bend + MSTMM_BEND_B(n),
             .G = bend + MSTMM_BEND_G(n), .W = bend + MSTMM_BEND_W(n),
             .S = state->tangents->numbers + mstmm_carried_at(state->tangents, body),
             .K = bend + MSTMM_BEND_K(n), .Z_z = bend + MSTMM_BEND_Z_Z(n),
@@ -20368,7 +20369,7 @@ static int mstmm_complex_at_tangent_eliminated(mstmm_complex_state *state, int i
         const int n = mstmm_modes_of(modal);
         mstmm_complex *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
         mstmm_complex_tangent_placed_node(
-            .n = modal->n, .H = state->tangents->held + modal->tangent + MSTMM_BEND_STILL(n), .V = bend + MSTMM_BEND_V(n),
+            .n = modal->n, .H = state->tangents->held + modal->tangent + MSTMM_BEND_ZERO_H(n), .V = bend + MSTMM_BEND_V(n),
             .D = bend + MSTMM_BEND_D(n), .S_p = place + MSTMM_PLACE_S(body->nu, body->nq),
             .Z_p = bend + MSTMM_BEND_PLACE_Z(n), .right = bend + MSTMM_BEND_RIGHT(n),
             .gain = bend + MSTMM_BEND_PLACE_GAIN(n), .S_c = S_p,
@@ -20439,7 +20440,7 @@ static int mstmm_complex_at_tangent_eliminated(mstmm_complex_state *state, int i
         double *laid = section ? state->workspace + section->place : NULL;
         mstmm_complex *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
         mstmm_complex *port = section ? state->tangents->numbers + section->tangent : NULL;
-        mstmm_complex_tangent_absorb(
+        mstmm_complex_tangent_assemble_port(
             .n = modal->n, .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
             .H = laid + MSTMM_SECTION_H(n), .B = port + MSTMM_PORT_B(n),
             .G = port + MSTMM_PORT_G(n), .W = port + MSTMM_PORT_W(n),
@@ -20455,7 +20456,7 @@ static int mstmm_complex_at_tangent_eliminated(mstmm_complex_state *state, int i
         double *laid = section ? state->workspace + section->place : NULL;
         mstmm_complex *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
         mstmm_complex *port = section ? state->tangents->numbers + section->tangent : NULL;
-        mstmm_complex_tangent_placed_absorb(
+        mstmm_complex_tangent_placed_port(
             .n = modal->n, .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
             .H = laid + MSTMM_SECTION_H(n), .B_p = port + MSTMM_PORT_PLACE_B(n),
             .S_p = place + MSTMM_PLACE_S(body->nu, body->nq), .T_p = T_p,
@@ -20488,14 +20489,14 @@ static int mstmm_complex_at_tangent_column(mstmm_complex_state *state, int index
 }
 
 /* Loads of a right-hand side carried to the parent. */
-static int mstmm_complex_at_tangent_carried(mstmm_complex_state *state, int index)
+static int mstmm_complex_at_tangent_backward(mstmm_complex_state *state, int index)
 {
     mstmm_complex e_c[6];
     mstmm_complex rows[6];
     const mstmm_body *body = &state->model->bodies[index];
     int columns[6];
     const int speeds = mstmm_free_speeds(state->memory, body, columns);
-    if (mstmm_aside(state->model, state->observed, index)) return 0;
+    if (mstmm_omitted(state->model, state->observed, index)) return 0;
     if (body->modal && body->section) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
@@ -20504,7 +20505,7 @@ static int mstmm_complex_at_tangent_carried(mstmm_complex_state *state, int inde
         mstmm_complex *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
         mstmm_complex *d_block = state->slope->workspace + body->block;
         mstmm_complex *d_modes = modal ? state->slope->workspace + modal->place : NULL;
-        mstmm_complex_tangent_push(
+        mstmm_complex_tangent_column_load(
             .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .V = bend + MSTMM_BEND_V(n),
             .D = bend + MSTMM_BEND_D(n), .e = d_block + MSTMM_BLOCK_E,
             .e_f = d_modes + MSTMM_MODES_E_F(n), .rest = bend + MSTMM_BEND_REST(n),
@@ -20517,8 +20518,8 @@ static int mstmm_complex_at_tangent_carried(mstmm_complex_state *state, int inde
         mstmm_complex *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
         mstmm_complex *d_block = state->slope->workspace + body->block;
         mstmm_complex *d_modes = modal ? state->slope->workspace + modal->place : NULL;
-        mstmm_complex_tangent_push(
-            .n = modal->n, .H = state->tangents->held + modal->tangent + MSTMM_BEND_STILL(n), .V = bend + MSTMM_BEND_V(n),
+        mstmm_complex_tangent_column_load(
+            .n = modal->n, .H = state->tangents->held + modal->tangent + MSTMM_BEND_ZERO_H(n), .V = bend + MSTMM_BEND_V(n),
             .D = bend + MSTMM_BEND_D(n), .e = d_block + MSTMM_BLOCK_E,
             .e_f = d_modes + MSTMM_MODES_E_F(n), .rest = bend + MSTMM_BEND_REST(n),
             .y = bend + MSTMM_BEND_Y(n), .e_c = e_c, .work = bend + MSTMM_BEND_WORK(n));
@@ -20545,7 +20546,7 @@ static int mstmm_complex_at_tangent_carried(mstmm_complex_state *state, int inde
         mstmm_complex *d_parent = mstmm_block(state->model, state->slope->workspace, body->parent);
         for (int k = 0; k < speeds; k++)
             rows[k] = (mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU))[columns[k]];
-        mstmm_complex_generic_tangent_push(speeds,
+        mstmm_complex_generic_tangent_load(speeds,
             .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
             .H = state->tangents->held + body->tangent + MSTMM_TANGENT_H(body->nu, body->nq),
             .V = tangent + MSTMM_TANGENT_V(body->nu, body->nq),
@@ -20564,7 +20565,7 @@ static int mstmm_complex_at_tangent_carried(mstmm_complex_state *state, int inde
 }
 
 /* Solution for a right-hand side. */
-static int mstmm_complex_at_tangent_answered(mstmm_complex_state *state, int index)
+static int mstmm_complex_at_tangent_forward(mstmm_complex_state *state, int index)
 {
     mstmm_complex x[6];
     mstmm_complex p[9];
@@ -20573,13 +20574,13 @@ static int mstmm_complex_at_tangent_answered(mstmm_complex_state *state, int ind
     const int nu = body->nu;
     int columns[6];
     const int speeds = mstmm_free_speeds(state->memory, body, columns);
-    if (mstmm_aside(state->model, state->observed, index)) return 0;
+    if (mstmm_omitted(state->model, state->observed, index)) return 0;
     mstmm_complex_set_zero(state->answer + body->u, nu);
     if (body->placed) {
         double *block = state->workspace + body->block;
         mstmm_complex *place = state->tangents->numbers + body->place;
         mstmm_complex *d_parent = mstmm_block(state->model, state->slope->workspace, body->parent);
-        mstmm_complex_frames_placed_moved(
+        mstmm_complex_frames_placed_displacement(
             .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
             .z_I = d_parent + MSTMM_BLOCK_MOTION,
             .p_I = state->tangents->numbers + mstmm_place_at(state->model, body->parent) + MSTMM_PLACE_Z(0, 0),
@@ -20588,7 +20589,7 @@ static int mstmm_complex_at_tangent_answered(mstmm_complex_state *state, int ind
     if (!body->section && speeds && body->placed) {
         mstmm_complex *tangent = state->tangents->numbers + body->tangent;
         mstmm_complex *place = state->tangents->numbers + body->place;
-        mstmm_complex_tangent_placed_left(
+        mstmm_complex_tangent_placed_remainder(
             .n = speeds, .gain = place + MSTMM_PLACE_GAIN(body->nu, body->nq),
             .p = place + MSTMM_PLACE_Z(body->nu, body->nq),
             .y = tangent + MSTMM_TANGENT_Y(body->nu, body->nq));
@@ -20599,7 +20600,7 @@ static int mstmm_complex_at_tangent_answered(mstmm_complex_state *state, int ind
         mstmm_complex *tangent = state->tangents->numbers + body->tangent;
         mstmm_complex *d_block = state->slope->workspace + body->block;
         mstmm_complex *d_parent = mstmm_block(state->model, state->slope->workspace, body->parent);
-        mstmm_complex_generic_tangent_answer(speeds,
+        mstmm_complex_generic_tangent_solution(speeds,
             .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
             .w_I = parent + MSTMM_BLOCK_MOTION, .v = block + MSTMM_BLOCK_HINGE_V,
             .w = block + MSTMM_BLOCK_HINGE_W, .z_I = d_parent + MSTMM_BLOCK_MOTION,
@@ -20613,7 +20614,7 @@ static int mstmm_complex_at_tangent_answered(mstmm_complex_state *state, int ind
     }
     if (!body->section && speeds && body->placed) {
         mstmm_complex *place = state->tangents->numbers + body->place;
-        mstmm_complex_tangent_displaced(
+        mstmm_complex_tangent_port_motion(
             .n = speeds, .B = place + MSTMM_PLACE_B(body->nu, body->nq), .x = x,
             .z_c = place + MSTMM_PLACE_Z(body->nu, body->nq), .z = p);
         memcpy(place + MSTMM_PLACE_Z(body->nu, body->nq), p, 9 * sizeof(mstmm_complex));
@@ -20623,7 +20624,7 @@ static int mstmm_complex_at_tangent_answered(mstmm_complex_state *state, int ind
         double *parent = mstmm_block(state->model, state->workspace, body->parent);
         mstmm_complex *d_block = state->slope->workspace + body->block;
         mstmm_complex *d_parent = mstmm_block(state->model, state->slope->workspace, body->parent);
-        mstmm_complex_frames_tangent_moved(
+        mstmm_complex_frames_tangent_motion(
             .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
             .w_I = parent + MSTMM_BLOCK_MOTION, .v = block + MSTMM_BLOCK_HINGE_V,
             .w = block + MSTMM_BLOCK_HINGE_W, .z_I = d_parent + MSTMM_BLOCK_MOTION,
@@ -20635,7 +20636,7 @@ static int mstmm_complex_at_tangent_answered(mstmm_complex_state *state, int ind
         const mstmm_section *section = body->section;
         mstmm_complex *port = section ? state->tangents->numbers + section->tangent : NULL;
         mstmm_complex *d_block = state->slope->workspace + body->block;
-        mstmm_complex_tangent_displaced(
+        mstmm_complex_tangent_port_motion(
             .n = modal->n, .B = port + MSTMM_PORT_B(n), .x = state->answer + modal->u,
             .z_c = d_block + MSTMM_BLOCK_MOTION, .z = z);
         memcpy(d_block + MSTMM_BLOCK_MOTION, z, 9 * sizeof(mstmm_complex));
@@ -20646,7 +20647,7 @@ static int mstmm_complex_at_tangent_answered(mstmm_complex_state *state, int ind
         const int n = mstmm_modes_of(modal);
         const mstmm_section *section = body->section;
         mstmm_complex *port = section ? state->tangents->numbers + section->tangent : NULL;
-        mstmm_complex_tangent_displaced(
+        mstmm_complex_tangent_port_motion(
             .n = modal->n, .B = port + MSTMM_PORT_PLACE_B(n), .x = state->answer + modal->u,
             .z_c = place + MSTMM_PLACE_Z(body->nu, body->nq), .z = p);
         memcpy(place + MSTMM_PLACE_Z(body->nu, body->nq), p, 9 * sizeof(mstmm_complex));
@@ -20656,7 +20657,7 @@ static int mstmm_complex_at_tangent_answered(mstmm_complex_state *state, int ind
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
         mstmm_complex *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
-        mstmm_complex_tangent_placed_left(
+        mstmm_complex_tangent_placed_remainder(
             .n = modal->n, .gain = bend + MSTMM_BEND_PLACE_GAIN(n),
             .p = place + MSTMM_PLACE_Z(body->nu, body->nq), .y = bend + MSTMM_BEND_Y(n));
     }
@@ -20665,7 +20666,7 @@ static int mstmm_complex_at_tangent_answered(mstmm_complex_state *state, int ind
         const int n = mstmm_modes_of(modal);
         mstmm_complex *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
         mstmm_complex *d_block = state->slope->workspace + body->block;
-        mstmm_complex_tangent_answer(
+        mstmm_complex_tangent_column_solution(
             .n = modal->n, .B = bend + MSTMM_BEND_B(n), .gain = bend + MSTMM_BEND_GAIN(n),
             .y = bend + MSTMM_BEND_Y(n), .z_c = d_block + MSTMM_BLOCK_MOTION,
             .x = state->answer + modal->u, .z = z);
@@ -20676,7 +20677,7 @@ static int mstmm_complex_at_tangent_answered(mstmm_complex_state *state, int ind
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
         mstmm_complex *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
-        mstmm_complex_tangent_displaced(
+        mstmm_complex_tangent_port_motion(
             .n = modal->n, .B = bend + MSTMM_BEND_PLACE_B(n), .x = state->answer + modal->u,
             .z_c = place + MSTMM_PLACE_Z(body->nu, body->nq), .z = p);
         memcpy(place + MSTMM_PLACE_Z(body->nu, body->nq), p, 9 * sizeof(mstmm_complex));

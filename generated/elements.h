@@ -314,7 +314,7 @@ int mstmm_hinge_ball_rates_by_coordinates(const real *restrict p, const real *re
     const real *restrict u, real *restrict J);
 int mstmm_hinge_ball_rates_by_speeds(const real *restrict p, const real *restrict q,
     const real *restrict u, real *restrict J);
-int mstmm_hinge_ball_forward_kept(const real *restrict p, const real *restrict q,
+int mstmm_hinge_ball_body_motion(const real *restrict p, const real *restrict q,
     const real *restrict u, const real *restrict Rt, const real *restrict ro,
     const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
     real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
@@ -348,7 +348,7 @@ int mstmm_hinge_cylindrical_rates_by_coordinates(const real *restrict p, const r
     const real *restrict u, real *restrict J);
 int mstmm_hinge_cylindrical_rates_by_speeds(const real *restrict p, const real *restrict q,
     const real *restrict u, real *restrict J);
-int mstmm_hinge_cylindrical_forward_kept(const real *restrict p, const real *restrict q,
+int mstmm_hinge_cylindrical_body_motion(const real *restrict p, const real *restrict q,
     const real *restrict u, const real *restrict Rt, const real *restrict ro,
     const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
     real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
@@ -378,7 +378,7 @@ int mstmm_hinge_fixed_hinge_slope(const real *restrict p, const real *restrict q
     const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
     real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
     real *restrict d_c, real *restrict d_qdot);
-int mstmm_hinge_fixed_forward_kept(const real *restrict p, const real *restrict q,
+int mstmm_hinge_fixed_body_motion(const real *restrict p, const real *restrict q,
     const real *restrict u, const real *restrict Rt, const real *restrict ro,
     const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
     real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
@@ -407,7 +407,7 @@ int mstmm_hinge_free_rates_by_coordinates(const real *restrict p, const real *re
     const real *restrict u, real *restrict J);
 int mstmm_hinge_free_rates_by_speeds(const real *restrict p, const real *restrict q,
     const real *restrict u, real *restrict J);
-int mstmm_hinge_free_forward_kept(const real *restrict p, const real *restrict q,
+int mstmm_hinge_free_body_motion(const real *restrict p, const real *restrict q,
     const real *restrict u, const real *restrict Rt, const real *restrict ro,
     const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
     real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
@@ -443,7 +443,7 @@ int mstmm_hinge_gimbal_rates_by_coordinates(const real *restrict p, const real *
     const real *restrict u, real *restrict J);
 int mstmm_hinge_gimbal_rates_by_speeds(const real *restrict p, const real *restrict q,
     const real *restrict u, real *restrict J);
-int mstmm_hinge_gimbal_forward_kept(const real *restrict p, const real *restrict q,
+int mstmm_hinge_gimbal_body_motion(const real *restrict p, const real *restrict q,
     const real *restrict u, const real *restrict Rt, const real *restrict ro,
     const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
     real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
@@ -477,7 +477,7 @@ int mstmm_hinge_pin_rates_by_coordinates(const real *restrict p, const real *res
     const real *restrict u, real *restrict J);
 int mstmm_hinge_pin_rates_by_speeds(const real *restrict p, const real *restrict q,
     const real *restrict u, real *restrict J);
-int mstmm_hinge_pin_forward_kept(const real *restrict p, const real *restrict q,
+int mstmm_hinge_pin_body_motion(const real *restrict p, const real *restrict q,
     const real *restrict u, const real *restrict Rt, const real *restrict ro,
     const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
     real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
@@ -511,7 +511,7 @@ int mstmm_hinge_planar_rates_by_coordinates(const real *restrict p, const real *
     const real *restrict u, real *restrict J);
 int mstmm_hinge_planar_rates_by_speeds(const real *restrict p, const real *restrict q,
     const real *restrict u, real *restrict J);
-int mstmm_hinge_planar_forward_kept(const real *restrict p, const real *restrict q,
+int mstmm_hinge_planar_body_motion(const real *restrict p, const real *restrict q,
     const real *restrict u, const real *restrict Rt, const real *restrict ro,
     const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
     real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
@@ -545,7 +545,7 @@ int mstmm_hinge_prismatic_rates_by_coordinates(const real *restrict p, const rea
     const real *restrict u, real *restrict J);
 int mstmm_hinge_prismatic_rates_by_speeds(const real *restrict p, const real *restrict q,
     const real *restrict u, real *restrict J);
-int mstmm_hinge_prismatic_forward_kept(const real *restrict p, const real *restrict q,
+int mstmm_hinge_prismatic_body_motion(const real *restrict p, const real *restrict q,
     const real *restrict u, const real *restrict Rt, const real *restrict ro,
     const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
     real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
@@ -579,7 +579,7 @@ int mstmm_hinge_screw_rates_by_coordinates(const real *restrict p, const real *r
     const real *restrict u, real *restrict J);
 int mstmm_hinge_screw_rates_by_speeds(const real *restrict p, const real *restrict q,
     const real *restrict u, real *restrict J);
-int mstmm_hinge_screw_forward_kept(const real *restrict p, const real *restrict q,
+int mstmm_hinge_screw_body_motion(const real *restrict p, const real *restrict q,
     const real *restrict u, const real *restrict Rt, const real *restrict ro,
     const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
     real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
@@ -613,7 +613,7 @@ int mstmm_hinge_universal_rates_by_coordinates(const real *restrict p, const rea
     const real *restrict u, real *restrict J);
 int mstmm_hinge_universal_rates_by_speeds(const real *restrict p, const real *restrict q,
     const real *restrict u, real *restrict J);
-int mstmm_hinge_universal_forward_kept(const real *restrict p, const real *restrict q,
+int mstmm_hinge_universal_body_motion(const real *restrict p, const real *restrict q,
     const real *restrict u, const real *restrict Rt, const real *restrict ro,
     const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
     real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
@@ -633,13 +633,13 @@ int mstmm_sweep_frames_velocity(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_frames_point(const real *restrict A, const real *restrict x, const real *restrict v,
     const real *restrict motion, const real *restrict delta, const real *restrict offset,
     const real *restrict gravity, real *restrict x_K, real *restrict v_K, real *restrict a_K);
-int mstmm_sweep_frames_turning(const real *restrict A, const real *restrict motion,
+int mstmm_sweep_frames_angular_motion(const real *restrict A, const real *restrict motion,
     const real *restrict delta, real *restrict w_K, real *restrict alpha_K);
 int mstmm_sweep_frames_end_frame(const real *restrict A, const real *restrict R_end,
     real *restrict A_end);
 int mstmm_sweep_frames_applied_load(const real *restrict A, const real *restrict A_F,
     const real *restrict offset, const real *restrict F, const real *restrict M, real *restrict e);
-int mstmm_sweep_frames_opposite(const real *restrict x_F, const real *restrict x_T,
+int mstmm_sweep_frames_reaction_wrench(const real *restrict x_F, const real *restrict x_T,
     const real *restrict F, const real *restrict M, real *restrict F_back, real *restrict M_back);
 int mstmm_sweep_frames_power(const real *restrict A_F, const real *restrict F,
     const real *restrict M, const real *restrict v_K, const real *restrict w_K, real *restrict P);
@@ -654,19 +654,20 @@ int mstmm_sweep_frames_pivot_floor(const real *restrict S, real *restrict floor_
 int mstmm_sweep_frames_reaction(const real *restrict S, const real *restrict e,
     const real *restrict delta, const real *restrict A, real *restrict f, real *restrict force,
     real *restrict moment);
-int mstmm_sweep_frames_moment_at(const real *restrict A, const real *restrict offset,
+int mstmm_sweep_frames_moment_about(const real *restrict A, const real *restrict offset,
     const real *restrict f, real *restrict moment);
 int mstmm_sweep_frames_transport(const real *restrict Rc, const real *restrict r,
     const real *restrict e, real *restrict e_I);
 int mstmm_sweep_frames_rotor_energy(const real *restrict J, const real *restrict u,
     real *restrict T);
-int mstmm_sweep_frames_driven_effort(const real *restrict felt, const real *restrict J,
+int mstmm_sweep_frames_driven_effort(const real *restrict load, const real *restrict J,
     const real *restrict udot, const real *restrict tau, real *restrict tau_d);
 int mstmm_sweep_frames_speed_power(const real *restrict tau, const real *restrict u,
     real *restrict P);
 int mstmm_sweep_frames_length(const real *restrict x_F, const real *restrict v_F,
     const real *restrict x_T, const real *restrict v_T, real *restrict l);
-int mstmm_sweep_frames_turned(const real *restrict A, const real *restrict b, real *restrict b_0);
+int mstmm_sweep_frames_to_inertial(const real *restrict A, const real *restrict b,
+    real *restrict b_0);
 int mstmm_sweep_frames_classical_body(const real *restrict A, const real *restrict p,
     const real *restrict motion, const real *restrict load, const real *restrict ro_n,
     real *restrict M, real *restrict r_IO, real *restrict r_IC, real *restrict J_I,
@@ -676,14 +677,14 @@ int mstmm_sweep_frames_state_deviation(const real *restrict A, const real *restr
 int mstmm_sweep_frames_tangent_carry(const real *restrict Rc, const real *restrict r,
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict S, real *restrict T, real *restrict S_I);
-int mstmm_sweep_frames_tangent_moved(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_frames_tangent_motion(const real *restrict Rc, const real *restrict r,
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, real *restrict z);
-int mstmm_sweep_frames_tangent_turned(const real *restrict R, const real *restrict d_R,
+int mstmm_sweep_frames_tangent_pose_change(const real *restrict R, const real *restrict d_R,
     const real *restrict d_d, real *restrict theta, real *restrict x);
-int mstmm_sweep_frames_tangent_known(const real *restrict S, const real *restrict b,
+int mstmm_sweep_frames_tangent_known_load(const real *restrict S, const real *restrict b,
     const real *restrict g, real *restrict e_S, real *restrict e_b);
-int mstmm_sweep_frames_placed_moved(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_frames_placed_displacement(const real *restrict Rc, const real *restrict r,
     const real *restrict z_I, const real *restrict p_I, real *restrict p);
 int mstmm_sweep_frames_placed_pose(const real *restrict A, const real *restrict p,
     real *restrict d_A, real *restrict d_x, real *restrict d_v);
@@ -693,7 +694,7 @@ int mstmm_sweep_frames_placed_column(const real *restrict theta, const real *res
 int mstmm_sweep_frames_placed_carry(const real *restrict Rc, const real *restrict r,
     const real *restrict S_p, real *restrict T_p, real *restrict T_w, real *restrict S_pI,
     real *restrict S_wI);
-int mstmm_sweep_frames_placed_known(const real *restrict S_p, const real *restrict b_p,
+int mstmm_sweep_frames_placed_known_load(const real *restrict S_p, const real *restrict b_p,
     real *restrict e_S, real *restrict e_b);
 int mstmm_sweep_frames_pose_slope(const real *restrict A_I, const real *restrict x_I,
     const real *restrict Rc, const real *restrict r, const real *restrict d_A_I,
@@ -708,7 +709,7 @@ int mstmm_sweep_frames_point_slope(const real *restrict A, const real *restrict 
     const real *restrict offset, const real *restrict gravity, const real *restrict d_A,
     const real *restrict d_x, const real *restrict d_v, const real *restrict d_motion,
     real *restrict d_x_K, real *restrict d_v_K);
-int mstmm_sweep_frames_turning_slope(const real *restrict A, const real *restrict motion,
+int mstmm_sweep_frames_angular_motion_slope(const real *restrict A, const real *restrict motion,
     const real *restrict delta, const real *restrict d_A, const real *restrict d_motion,
     real *restrict d_w_K);
 int mstmm_sweep_frames_end_frame_slope(const real *restrict A, const real *restrict R_end,
@@ -717,15 +718,15 @@ int mstmm_sweep_frames_applied_load_slope(const real *restrict A, const real *re
     const real *restrict offset, const real *restrict F, const real *restrict M,
     const real *restrict d_A, const real *restrict d_A_F, const real *restrict d_F,
     const real *restrict d_M, real *restrict d_e);
-int mstmm_sweep_frames_opposite_slope(const real *restrict x_F, const real *restrict x_T,
+int mstmm_sweep_frames_reaction_wrench_slope(const real *restrict x_F, const real *restrict x_T,
     const real *restrict F, const real *restrict M, const real *restrict d_x_F,
     const real *restrict d_x_T, const real *restrict d_F, const real *restrict d_M,
     real *restrict d_F_back, real *restrict d_M_back);
 int mstmm_sweep_frames_transport_slope(const real *restrict Rc, const real *restrict r,
     const real *restrict e, const real *restrict d_Rc, const real *restrict d_r,
     const real *restrict d_e, real *restrict d_e_I);
-int mstmm_sweep_frames_driven_effort_slope(const real *restrict felt, const real *restrict J,
-    const real *restrict udot, const real *restrict tau, const real *restrict d_felt,
+int mstmm_sweep_frames_driven_effort_slope(const real *restrict load, const real *restrict J,
+    const real *restrict udot, const real *restrict tau, const real *restrict d_load,
     const real *restrict d_udot, const real *restrict d_tau, real *restrict d_tau_d);
 int mstmm_sweep_frames_length_slope(const real *restrict x_F, const real *restrict v_F,
     const real *restrict x_T, const real *restrict v_T, const real *restrict d_x_F,
@@ -752,10 +753,10 @@ int mstmm_sweep_generic0_factor(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict J, const real *restrict W,
     const real *restrict floor_, const real *restrict S, real *restrict F, real *restrict G,
     real *restrict S_I);
-int mstmm_sweep_generic0_push(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic0_column_load(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict G, const real *restrict e,
     const real *restrict tau, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic0_answer(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic0_column_acceleration(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_sweep_generic0_qr_eliminate(const real *restrict H, const real *restrict J,
@@ -804,10 +805,10 @@ int mstmm_sweep_generic1_factor(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict J, const real *restrict W,
     const real *restrict floor_, const real *restrict S, real *restrict F, real *restrict G,
     real *restrict S_I);
-int mstmm_sweep_generic1_push(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic1_column_load(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict G, const real *restrict e,
     const real *restrict tau, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic1_answer(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic1_column_acceleration(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_sweep_generic1_qr_eliminate(const real *restrict H, const real *restrict J,
@@ -823,14 +824,14 @@ int mstmm_sweep_generic1_tangent_column(const real *restrict theta, const real *
     const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
     const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
     real *restrict G, real *restrict row);
-int mstmm_sweep_generic1_tangent_along(const real *restrict H, const real *restrict d_q,
+int mstmm_sweep_generic1_tangent_coordinate_change(const real *restrict H, const real *restrict d_q,
     real *restrict theta, real *restrict x);
 int mstmm_sweep_generic1_tangent_steady(const real *restrict theta, const real *restrict x,
     const real *restrict H, const real *restrict v, const real *restrict w, const real *restrict Q,
     const real *restrict f, const real *restrict d_u, const real *restrict d_s,
     const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
     real *restrict row);
-int mstmm_sweep_generic1_tangent_turning(const real *restrict theta, const real *restrict H,
+int mstmm_sweep_generic1_tangent_rotational(const real *restrict theta, const real *restrict H,
     const real *restrict w, const real *restrict Q, const real *restrict f,
     const real *restrict d_u, const real *restrict d_s, const real *restrict J,
     const real *restrict laws, real *restrict B, real *restrict G, real *restrict row);
@@ -840,29 +841,32 @@ int mstmm_sweep_generic1_tangent_rows(const real *restrict H, const real *restri
 int mstmm_sweep_generic1_tangent_reduce(const real *restrict inverse, const real *restrict right,
     const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
     real *restrict S);
-int mstmm_sweep_generic1_tangent_push(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic1_tangent_load(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict V, const real *restrict inverse,
     const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic1_tangent_answer(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic1_tangent_solution(const real *restrict Rc, const real *restrict r,
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, const real *restrict B, const real *restrict gain,
     const real *restrict y, real *restrict x, real *restrict z);
-int mstmm_sweep_generic1_tangent_push_known(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict V, const real *restrict inverse,
-    const real *restrict e, const real *restrict e_f, const real *restrict e_b, real *restrict y,
-    real *restrict e_I);
-int mstmm_sweep_generic1_tangent_answer_known(const real *restrict Rc, const real *restrict r,
-    const real *restrict w_I, const real *restrict v, const real *restrict w,
-    const real *restrict z_I, const real *restrict B, const real *restrict gain,
-    const real *restrict y, const real *restrict b, real *restrict x, real *restrict z);
+int mstmm_sweep_generic1_tangent_load_with_increments(const real *restrict Rc,
+    const real *restrict r, const real *restrict H, const real *restrict V,
+    const real *restrict inverse, const real *restrict e, const real *restrict e_f,
+    const real *restrict e_b, real *restrict y, real *restrict e_I);
+int mstmm_sweep_generic1_tangent_solution_with_increments(const real *restrict Rc,
+    const real *restrict r, const real *restrict w_I, const real *restrict v,
+    const real *restrict w, const real *restrict z_I, const real *restrict B,
+    const real *restrict gain, const real *restrict y, const real *restrict b, real *restrict x,
+    real *restrict z);
 int mstmm_sweep_generic1_complement(const real *restrict H, real *restrict W);
 int mstmm_sweep_generic1_divide(const real *restrict F, const real *restrict y, real *restrict z);
 int mstmm_sweep_generic1_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
-int mstmm_sweep_generic1_answered(const real *restrict y, const real *restrict z, real *restrict l);
-int mstmm_sweep_generic1_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
-int mstmm_sweep_generic1_exerted(const real *restrict S, const real *restrict H,
+int mstmm_sweep_generic1_add_known_part(const real *restrict y, const real *restrict z,
+    real *restrict l);
+int mstmm_sweep_generic1_add_multiplier_effort(const real *restrict y, const real *restrict x,
+    real *restrict y_0);
+int mstmm_sweep_generic1_required_load(const real *restrict S, const real *restrict H,
     const real *restrict udot, real *restrict e);
-int mstmm_sweep_generic1_push_on_ground(const real *restrict H, const real *restrict e,
+int mstmm_sweep_generic1_ground_column_load(const real *restrict H, const real *restrict e,
     const real *restrict tau, real *restrict y);
 int mstmm_sweep_generic1_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
@@ -875,9 +879,9 @@ int mstmm_sweep_generic1_effort_slope(const real *restrict H, const real *restri
     const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
 int mstmm_sweep_generic1_complement_slope(const real *restrict H, const real *restrict d_H,
     real *restrict d_W);
-int mstmm_sweep_generic1_answered_slope(const real *restrict y, const real *restrict z,
+int mstmm_sweep_generic1_add_known_part_slope(const real *restrict y, const real *restrict z,
     const real *restrict d_y, const real *restrict d_z, real *restrict d_l);
-int mstmm_sweep_generic1_pull_slope(const real *restrict y, const real *restrict x,
+int mstmm_sweep_generic1_add_multiplier_effort_slope(const real *restrict y, const real *restrict x,
     const real *restrict d_y, const real *restrict d_x, real *restrict d_y_0);
 
 extern const mstmm_element mstmm_sweep_generic2;
@@ -900,10 +904,10 @@ int mstmm_sweep_generic2_factor(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict J, const real *restrict W,
     const real *restrict floor_, const real *restrict S, real *restrict F, real *restrict G,
     real *restrict S_I);
-int mstmm_sweep_generic2_push(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic2_column_load(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict G, const real *restrict e,
     const real *restrict tau, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic2_answer(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic2_column_acceleration(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_sweep_generic2_qr_eliminate(const real *restrict H, const real *restrict J,
@@ -919,14 +923,14 @@ int mstmm_sweep_generic2_tangent_column(const real *restrict theta, const real *
     const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
     const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
     real *restrict G, real *restrict row);
-int mstmm_sweep_generic2_tangent_along(const real *restrict H, const real *restrict d_q,
+int mstmm_sweep_generic2_tangent_coordinate_change(const real *restrict H, const real *restrict d_q,
     real *restrict theta, real *restrict x);
 int mstmm_sweep_generic2_tangent_steady(const real *restrict theta, const real *restrict x,
     const real *restrict H, const real *restrict v, const real *restrict w, const real *restrict Q,
     const real *restrict f, const real *restrict d_u, const real *restrict d_s,
     const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
     real *restrict row);
-int mstmm_sweep_generic2_tangent_turning(const real *restrict theta, const real *restrict H,
+int mstmm_sweep_generic2_tangent_rotational(const real *restrict theta, const real *restrict H,
     const real *restrict w, const real *restrict Q, const real *restrict f,
     const real *restrict d_u, const real *restrict d_s, const real *restrict J,
     const real *restrict laws, real *restrict B, real *restrict G, real *restrict row);
@@ -936,29 +940,32 @@ int mstmm_sweep_generic2_tangent_rows(const real *restrict H, const real *restri
 int mstmm_sweep_generic2_tangent_reduce(const real *restrict inverse, const real *restrict right,
     const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
     real *restrict S);
-int mstmm_sweep_generic2_tangent_push(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic2_tangent_load(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict V, const real *restrict inverse,
     const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic2_tangent_answer(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic2_tangent_solution(const real *restrict Rc, const real *restrict r,
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, const real *restrict B, const real *restrict gain,
     const real *restrict y, real *restrict x, real *restrict z);
-int mstmm_sweep_generic2_tangent_push_known(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict V, const real *restrict inverse,
-    const real *restrict e, const real *restrict e_f, const real *restrict e_b, real *restrict y,
-    real *restrict e_I);
-int mstmm_sweep_generic2_tangent_answer_known(const real *restrict Rc, const real *restrict r,
-    const real *restrict w_I, const real *restrict v, const real *restrict w,
-    const real *restrict z_I, const real *restrict B, const real *restrict gain,
-    const real *restrict y, const real *restrict b, real *restrict x, real *restrict z);
+int mstmm_sweep_generic2_tangent_load_with_increments(const real *restrict Rc,
+    const real *restrict r, const real *restrict H, const real *restrict V,
+    const real *restrict inverse, const real *restrict e, const real *restrict e_f,
+    const real *restrict e_b, real *restrict y, real *restrict e_I);
+int mstmm_sweep_generic2_tangent_solution_with_increments(const real *restrict Rc,
+    const real *restrict r, const real *restrict w_I, const real *restrict v,
+    const real *restrict w, const real *restrict z_I, const real *restrict B,
+    const real *restrict gain, const real *restrict y, const real *restrict b, real *restrict x,
+    real *restrict z);
 int mstmm_sweep_generic2_complement(const real *restrict H, real *restrict W);
 int mstmm_sweep_generic2_divide(const real *restrict F, const real *restrict y, real *restrict z);
 int mstmm_sweep_generic2_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
-int mstmm_sweep_generic2_answered(const real *restrict y, const real *restrict z, real *restrict l);
-int mstmm_sweep_generic2_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
-int mstmm_sweep_generic2_exerted(const real *restrict S, const real *restrict H,
+int mstmm_sweep_generic2_add_known_part(const real *restrict y, const real *restrict z,
+    real *restrict l);
+int mstmm_sweep_generic2_add_multiplier_effort(const real *restrict y, const real *restrict x,
+    real *restrict y_0);
+int mstmm_sweep_generic2_required_load(const real *restrict S, const real *restrict H,
     const real *restrict udot, real *restrict e);
-int mstmm_sweep_generic2_push_on_ground(const real *restrict H, const real *restrict e,
+int mstmm_sweep_generic2_ground_column_load(const real *restrict H, const real *restrict e,
     const real *restrict tau, real *restrict y);
 int mstmm_sweep_generic2_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
@@ -971,9 +978,9 @@ int mstmm_sweep_generic2_effort_slope(const real *restrict H, const real *restri
     const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
 int mstmm_sweep_generic2_complement_slope(const real *restrict H, const real *restrict d_H,
     real *restrict d_W);
-int mstmm_sweep_generic2_answered_slope(const real *restrict y, const real *restrict z,
+int mstmm_sweep_generic2_add_known_part_slope(const real *restrict y, const real *restrict z,
     const real *restrict d_y, const real *restrict d_z, real *restrict d_l);
-int mstmm_sweep_generic2_pull_slope(const real *restrict y, const real *restrict x,
+int mstmm_sweep_generic2_add_multiplier_effort_slope(const real *restrict y, const real *restrict x,
     const real *restrict d_y, const real *restrict d_x, real *restrict d_y_0);
 
 extern const mstmm_element mstmm_sweep_generic3;
@@ -996,10 +1003,10 @@ int mstmm_sweep_generic3_factor(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict J, const real *restrict W,
     const real *restrict floor_, const real *restrict S, real *restrict F, real *restrict G,
     real *restrict S_I);
-int mstmm_sweep_generic3_push(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic3_column_load(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict G, const real *restrict e,
     const real *restrict tau, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic3_answer(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic3_column_acceleration(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_sweep_generic3_qr_eliminate(const real *restrict H, const real *restrict J,
@@ -1015,14 +1022,14 @@ int mstmm_sweep_generic3_tangent_column(const real *restrict theta, const real *
     const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
     const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
     real *restrict G, real *restrict row);
-int mstmm_sweep_generic3_tangent_along(const real *restrict H, const real *restrict d_q,
+int mstmm_sweep_generic3_tangent_coordinate_change(const real *restrict H, const real *restrict d_q,
     real *restrict theta, real *restrict x);
 int mstmm_sweep_generic3_tangent_steady(const real *restrict theta, const real *restrict x,
     const real *restrict H, const real *restrict v, const real *restrict w, const real *restrict Q,
     const real *restrict f, const real *restrict d_u, const real *restrict d_s,
     const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
     real *restrict row);
-int mstmm_sweep_generic3_tangent_turning(const real *restrict theta, const real *restrict H,
+int mstmm_sweep_generic3_tangent_rotational(const real *restrict theta, const real *restrict H,
     const real *restrict w, const real *restrict Q, const real *restrict f,
     const real *restrict d_u, const real *restrict d_s, const real *restrict J,
     const real *restrict laws, real *restrict B, real *restrict G, real *restrict row);
@@ -1032,29 +1039,32 @@ int mstmm_sweep_generic3_tangent_rows(const real *restrict H, const real *restri
 int mstmm_sweep_generic3_tangent_reduce(const real *restrict inverse, const real *restrict right,
     const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
     real *restrict S);
-int mstmm_sweep_generic3_tangent_push(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic3_tangent_load(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict V, const real *restrict inverse,
     const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic3_tangent_answer(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic3_tangent_solution(const real *restrict Rc, const real *restrict r,
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, const real *restrict B, const real *restrict gain,
     const real *restrict y, real *restrict x, real *restrict z);
-int mstmm_sweep_generic3_tangent_push_known(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict V, const real *restrict inverse,
-    const real *restrict e, const real *restrict e_f, const real *restrict e_b, real *restrict y,
-    real *restrict e_I);
-int mstmm_sweep_generic3_tangent_answer_known(const real *restrict Rc, const real *restrict r,
-    const real *restrict w_I, const real *restrict v, const real *restrict w,
-    const real *restrict z_I, const real *restrict B, const real *restrict gain,
-    const real *restrict y, const real *restrict b, real *restrict x, real *restrict z);
+int mstmm_sweep_generic3_tangent_load_with_increments(const real *restrict Rc,
+    const real *restrict r, const real *restrict H, const real *restrict V,
+    const real *restrict inverse, const real *restrict e, const real *restrict e_f,
+    const real *restrict e_b, real *restrict y, real *restrict e_I);
+int mstmm_sweep_generic3_tangent_solution_with_increments(const real *restrict Rc,
+    const real *restrict r, const real *restrict w_I, const real *restrict v,
+    const real *restrict w, const real *restrict z_I, const real *restrict B,
+    const real *restrict gain, const real *restrict y, const real *restrict b, real *restrict x,
+    real *restrict z);
 int mstmm_sweep_generic3_complement(const real *restrict H, real *restrict W);
 int mstmm_sweep_generic3_divide(const real *restrict F, const real *restrict y, real *restrict z);
 int mstmm_sweep_generic3_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
-int mstmm_sweep_generic3_answered(const real *restrict y, const real *restrict z, real *restrict l);
-int mstmm_sweep_generic3_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
-int mstmm_sweep_generic3_exerted(const real *restrict S, const real *restrict H,
+int mstmm_sweep_generic3_add_known_part(const real *restrict y, const real *restrict z,
+    real *restrict l);
+int mstmm_sweep_generic3_add_multiplier_effort(const real *restrict y, const real *restrict x,
+    real *restrict y_0);
+int mstmm_sweep_generic3_required_load(const real *restrict S, const real *restrict H,
     const real *restrict udot, real *restrict e);
-int mstmm_sweep_generic3_push_on_ground(const real *restrict H, const real *restrict e,
+int mstmm_sweep_generic3_ground_column_load(const real *restrict H, const real *restrict e,
     const real *restrict tau, real *restrict y);
 int mstmm_sweep_generic3_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
@@ -1067,9 +1077,9 @@ int mstmm_sweep_generic3_effort_slope(const real *restrict H, const real *restri
     const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
 int mstmm_sweep_generic3_complement_slope(const real *restrict H, const real *restrict d_H,
     real *restrict d_W);
-int mstmm_sweep_generic3_answered_slope(const real *restrict y, const real *restrict z,
+int mstmm_sweep_generic3_add_known_part_slope(const real *restrict y, const real *restrict z,
     const real *restrict d_y, const real *restrict d_z, real *restrict d_l);
-int mstmm_sweep_generic3_pull_slope(const real *restrict y, const real *restrict x,
+int mstmm_sweep_generic3_add_multiplier_effort_slope(const real *restrict y, const real *restrict x,
     const real *restrict d_y, const real *restrict d_x, real *restrict d_y_0);
 
 extern const mstmm_element mstmm_sweep_generic4;
@@ -1092,10 +1102,10 @@ int mstmm_sweep_generic4_factor(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict J, const real *restrict W,
     const real *restrict floor_, const real *restrict S, real *restrict F, real *restrict G,
     real *restrict S_I);
-int mstmm_sweep_generic4_push(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic4_column_load(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict G, const real *restrict e,
     const real *restrict tau, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic4_answer(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic4_column_acceleration(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_sweep_generic4_qr_eliminate(const real *restrict H, const real *restrict J,
@@ -1111,14 +1121,14 @@ int mstmm_sweep_generic4_tangent_column(const real *restrict theta, const real *
     const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
     const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
     real *restrict G, real *restrict row);
-int mstmm_sweep_generic4_tangent_along(const real *restrict H, const real *restrict d_q,
+int mstmm_sweep_generic4_tangent_coordinate_change(const real *restrict H, const real *restrict d_q,
     real *restrict theta, real *restrict x);
 int mstmm_sweep_generic4_tangent_steady(const real *restrict theta, const real *restrict x,
     const real *restrict H, const real *restrict v, const real *restrict w, const real *restrict Q,
     const real *restrict f, const real *restrict d_u, const real *restrict d_s,
     const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
     real *restrict row);
-int mstmm_sweep_generic4_tangent_turning(const real *restrict theta, const real *restrict H,
+int mstmm_sweep_generic4_tangent_rotational(const real *restrict theta, const real *restrict H,
     const real *restrict w, const real *restrict Q, const real *restrict f,
     const real *restrict d_u, const real *restrict d_s, const real *restrict J,
     const real *restrict laws, real *restrict B, real *restrict G, real *restrict row);
@@ -1128,29 +1138,32 @@ int mstmm_sweep_generic4_tangent_rows(const real *restrict H, const real *restri
 int mstmm_sweep_generic4_tangent_reduce(const real *restrict inverse, const real *restrict right,
     const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
     real *restrict S);
-int mstmm_sweep_generic4_tangent_push(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic4_tangent_load(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict V, const real *restrict inverse,
     const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic4_tangent_answer(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic4_tangent_solution(const real *restrict Rc, const real *restrict r,
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, const real *restrict B, const real *restrict gain,
     const real *restrict y, real *restrict x, real *restrict z);
-int mstmm_sweep_generic4_tangent_push_known(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict V, const real *restrict inverse,
-    const real *restrict e, const real *restrict e_f, const real *restrict e_b, real *restrict y,
-    real *restrict e_I);
-int mstmm_sweep_generic4_tangent_answer_known(const real *restrict Rc, const real *restrict r,
-    const real *restrict w_I, const real *restrict v, const real *restrict w,
-    const real *restrict z_I, const real *restrict B, const real *restrict gain,
-    const real *restrict y, const real *restrict b, real *restrict x, real *restrict z);
+int mstmm_sweep_generic4_tangent_load_with_increments(const real *restrict Rc,
+    const real *restrict r, const real *restrict H, const real *restrict V,
+    const real *restrict inverse, const real *restrict e, const real *restrict e_f,
+    const real *restrict e_b, real *restrict y, real *restrict e_I);
+int mstmm_sweep_generic4_tangent_solution_with_increments(const real *restrict Rc,
+    const real *restrict r, const real *restrict w_I, const real *restrict v,
+    const real *restrict w, const real *restrict z_I, const real *restrict B,
+    const real *restrict gain, const real *restrict y, const real *restrict b, real *restrict x,
+    real *restrict z);
 int mstmm_sweep_generic4_complement(const real *restrict H, real *restrict W);
 int mstmm_sweep_generic4_divide(const real *restrict F, const real *restrict y, real *restrict z);
 int mstmm_sweep_generic4_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
-int mstmm_sweep_generic4_answered(const real *restrict y, const real *restrict z, real *restrict l);
-int mstmm_sweep_generic4_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
-int mstmm_sweep_generic4_exerted(const real *restrict S, const real *restrict H,
+int mstmm_sweep_generic4_add_known_part(const real *restrict y, const real *restrict z,
+    real *restrict l);
+int mstmm_sweep_generic4_add_multiplier_effort(const real *restrict y, const real *restrict x,
+    real *restrict y_0);
+int mstmm_sweep_generic4_required_load(const real *restrict S, const real *restrict H,
     const real *restrict udot, real *restrict e);
-int mstmm_sweep_generic4_push_on_ground(const real *restrict H, const real *restrict e,
+int mstmm_sweep_generic4_ground_column_load(const real *restrict H, const real *restrict e,
     const real *restrict tau, real *restrict y);
 int mstmm_sweep_generic4_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
@@ -1163,9 +1176,9 @@ int mstmm_sweep_generic4_effort_slope(const real *restrict H, const real *restri
     const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
 int mstmm_sweep_generic4_complement_slope(const real *restrict H, const real *restrict d_H,
     real *restrict d_W);
-int mstmm_sweep_generic4_answered_slope(const real *restrict y, const real *restrict z,
+int mstmm_sweep_generic4_add_known_part_slope(const real *restrict y, const real *restrict z,
     const real *restrict d_y, const real *restrict d_z, real *restrict d_l);
-int mstmm_sweep_generic4_pull_slope(const real *restrict y, const real *restrict x,
+int mstmm_sweep_generic4_add_multiplier_effort_slope(const real *restrict y, const real *restrict x,
     const real *restrict d_y, const real *restrict d_x, real *restrict d_y_0);
 
 extern const mstmm_element mstmm_sweep_generic5;
@@ -1188,10 +1201,10 @@ int mstmm_sweep_generic5_factor(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict J, const real *restrict W,
     const real *restrict floor_, const real *restrict S, real *restrict F, real *restrict G,
     real *restrict S_I);
-int mstmm_sweep_generic5_push(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic5_column_load(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict G, const real *restrict e,
     const real *restrict tau, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic5_answer(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic5_column_acceleration(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_sweep_generic5_qr_eliminate(const real *restrict H, const real *restrict J,
@@ -1207,14 +1220,14 @@ int mstmm_sweep_generic5_tangent_column(const real *restrict theta, const real *
     const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
     const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
     real *restrict G, real *restrict row);
-int mstmm_sweep_generic5_tangent_along(const real *restrict H, const real *restrict d_q,
+int mstmm_sweep_generic5_tangent_coordinate_change(const real *restrict H, const real *restrict d_q,
     real *restrict theta, real *restrict x);
 int mstmm_sweep_generic5_tangent_steady(const real *restrict theta, const real *restrict x,
     const real *restrict H, const real *restrict v, const real *restrict w, const real *restrict Q,
     const real *restrict f, const real *restrict d_u, const real *restrict d_s,
     const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
     real *restrict row);
-int mstmm_sweep_generic5_tangent_turning(const real *restrict theta, const real *restrict H,
+int mstmm_sweep_generic5_tangent_rotational(const real *restrict theta, const real *restrict H,
     const real *restrict w, const real *restrict Q, const real *restrict f,
     const real *restrict d_u, const real *restrict d_s, const real *restrict J,
     const real *restrict laws, real *restrict B, real *restrict G, real *restrict row);
@@ -1224,29 +1237,32 @@ int mstmm_sweep_generic5_tangent_rows(const real *restrict H, const real *restri
 int mstmm_sweep_generic5_tangent_reduce(const real *restrict inverse, const real *restrict right,
     const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
     real *restrict S);
-int mstmm_sweep_generic5_tangent_push(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic5_tangent_load(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict V, const real *restrict inverse,
     const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic5_tangent_answer(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic5_tangent_solution(const real *restrict Rc, const real *restrict r,
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, const real *restrict B, const real *restrict gain,
     const real *restrict y, real *restrict x, real *restrict z);
-int mstmm_sweep_generic5_tangent_push_known(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict V, const real *restrict inverse,
-    const real *restrict e, const real *restrict e_f, const real *restrict e_b, real *restrict y,
-    real *restrict e_I);
-int mstmm_sweep_generic5_tangent_answer_known(const real *restrict Rc, const real *restrict r,
-    const real *restrict w_I, const real *restrict v, const real *restrict w,
-    const real *restrict z_I, const real *restrict B, const real *restrict gain,
-    const real *restrict y, const real *restrict b, real *restrict x, real *restrict z);
+int mstmm_sweep_generic5_tangent_load_with_increments(const real *restrict Rc,
+    const real *restrict r, const real *restrict H, const real *restrict V,
+    const real *restrict inverse, const real *restrict e, const real *restrict e_f,
+    const real *restrict e_b, real *restrict y, real *restrict e_I);
+int mstmm_sweep_generic5_tangent_solution_with_increments(const real *restrict Rc,
+    const real *restrict r, const real *restrict w_I, const real *restrict v,
+    const real *restrict w, const real *restrict z_I, const real *restrict B,
+    const real *restrict gain, const real *restrict y, const real *restrict b, real *restrict x,
+    real *restrict z);
 int mstmm_sweep_generic5_complement(const real *restrict H, real *restrict W);
 int mstmm_sweep_generic5_divide(const real *restrict F, const real *restrict y, real *restrict z);
 int mstmm_sweep_generic5_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
-int mstmm_sweep_generic5_answered(const real *restrict y, const real *restrict z, real *restrict l);
-int mstmm_sweep_generic5_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
-int mstmm_sweep_generic5_exerted(const real *restrict S, const real *restrict H,
+int mstmm_sweep_generic5_add_known_part(const real *restrict y, const real *restrict z,
+    real *restrict l);
+int mstmm_sweep_generic5_add_multiplier_effort(const real *restrict y, const real *restrict x,
+    real *restrict y_0);
+int mstmm_sweep_generic5_required_load(const real *restrict S, const real *restrict H,
     const real *restrict udot, real *restrict e);
-int mstmm_sweep_generic5_push_on_ground(const real *restrict H, const real *restrict e,
+int mstmm_sweep_generic5_ground_column_load(const real *restrict H, const real *restrict e,
     const real *restrict tau, real *restrict y);
 int mstmm_sweep_generic5_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
@@ -1259,9 +1275,9 @@ int mstmm_sweep_generic5_effort_slope(const real *restrict H, const real *restri
     const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
 int mstmm_sweep_generic5_complement_slope(const real *restrict H, const real *restrict d_H,
     real *restrict d_W);
-int mstmm_sweep_generic5_answered_slope(const real *restrict y, const real *restrict z,
+int mstmm_sweep_generic5_add_known_part_slope(const real *restrict y, const real *restrict z,
     const real *restrict d_y, const real *restrict d_z, real *restrict d_l);
-int mstmm_sweep_generic5_pull_slope(const real *restrict y, const real *restrict x,
+int mstmm_sweep_generic5_add_multiplier_effort_slope(const real *restrict y, const real *restrict x,
     const real *restrict d_y, const real *restrict d_x, real *restrict d_y_0);
 
 extern const mstmm_element mstmm_sweep_generic6;
@@ -1284,10 +1300,10 @@ int mstmm_sweep_generic6_factor(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict J, const real *restrict W,
     const real *restrict floor_, const real *restrict S, real *restrict F, real *restrict G,
     real *restrict S_I);
-int mstmm_sweep_generic6_push(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic6_column_load(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict G, const real *restrict e,
     const real *restrict tau, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic6_answer(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic6_column_acceleration(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_sweep_generic6_qr_eliminate(const real *restrict H, const real *restrict J,
@@ -1303,14 +1319,14 @@ int mstmm_sweep_generic6_tangent_column(const real *restrict theta, const real *
     const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
     const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
     real *restrict G, real *restrict row);
-int mstmm_sweep_generic6_tangent_along(const real *restrict H, const real *restrict d_q,
+int mstmm_sweep_generic6_tangent_coordinate_change(const real *restrict H, const real *restrict d_q,
     real *restrict theta, real *restrict x);
 int mstmm_sweep_generic6_tangent_steady(const real *restrict theta, const real *restrict x,
     const real *restrict H, const real *restrict v, const real *restrict w, const real *restrict Q,
     const real *restrict f, const real *restrict d_u, const real *restrict d_s,
     const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
     real *restrict row);
-int mstmm_sweep_generic6_tangent_turning(const real *restrict theta, const real *restrict H,
+int mstmm_sweep_generic6_tangent_rotational(const real *restrict theta, const real *restrict H,
     const real *restrict w, const real *restrict Q, const real *restrict f,
     const real *restrict d_u, const real *restrict d_s, const real *restrict J,
     const real *restrict laws, real *restrict B, real *restrict G, real *restrict row);
@@ -1320,29 +1336,32 @@ int mstmm_sweep_generic6_tangent_rows(const real *restrict H, const real *restri
 int mstmm_sweep_generic6_tangent_reduce(const real *restrict inverse, const real *restrict right,
     const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
     real *restrict S);
-int mstmm_sweep_generic6_tangent_push(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic6_tangent_load(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict V, const real *restrict inverse,
     const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic6_tangent_answer(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic6_tangent_solution(const real *restrict Rc, const real *restrict r,
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, const real *restrict B, const real *restrict gain,
     const real *restrict y, real *restrict x, real *restrict z);
-int mstmm_sweep_generic6_tangent_push_known(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict V, const real *restrict inverse,
-    const real *restrict e, const real *restrict e_f, const real *restrict e_b, real *restrict y,
-    real *restrict e_I);
-int mstmm_sweep_generic6_tangent_answer_known(const real *restrict Rc, const real *restrict r,
-    const real *restrict w_I, const real *restrict v, const real *restrict w,
-    const real *restrict z_I, const real *restrict B, const real *restrict gain,
-    const real *restrict y, const real *restrict b, real *restrict x, real *restrict z);
+int mstmm_sweep_generic6_tangent_load_with_increments(const real *restrict Rc,
+    const real *restrict r, const real *restrict H, const real *restrict V,
+    const real *restrict inverse, const real *restrict e, const real *restrict e_f,
+    const real *restrict e_b, real *restrict y, real *restrict e_I);
+int mstmm_sweep_generic6_tangent_solution_with_increments(const real *restrict Rc,
+    const real *restrict r, const real *restrict w_I, const real *restrict v,
+    const real *restrict w, const real *restrict z_I, const real *restrict B,
+    const real *restrict gain, const real *restrict y, const real *restrict b, real *restrict x,
+    real *restrict z);
 int mstmm_sweep_generic6_complement(const real *restrict H, real *restrict W);
 int mstmm_sweep_generic6_divide(const real *restrict F, const real *restrict y, real *restrict z);
 int mstmm_sweep_generic6_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
-int mstmm_sweep_generic6_answered(const real *restrict y, const real *restrict z, real *restrict l);
-int mstmm_sweep_generic6_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
-int mstmm_sweep_generic6_exerted(const real *restrict S, const real *restrict H,
+int mstmm_sweep_generic6_add_known_part(const real *restrict y, const real *restrict z,
+    real *restrict l);
+int mstmm_sweep_generic6_add_multiplier_effort(const real *restrict y, const real *restrict x,
+    real *restrict y_0);
+int mstmm_sweep_generic6_required_load(const real *restrict S, const real *restrict H,
     const real *restrict udot, real *restrict e);
-int mstmm_sweep_generic6_push_on_ground(const real *restrict H, const real *restrict e,
+int mstmm_sweep_generic6_ground_column_load(const real *restrict H, const real *restrict e,
     const real *restrict tau, real *restrict y);
 int mstmm_sweep_generic6_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
@@ -1355,9 +1374,9 @@ int mstmm_sweep_generic6_effort_slope(const real *restrict H, const real *restri
     const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
 int mstmm_sweep_generic6_complement_slope(const real *restrict H, const real *restrict d_H,
     real *restrict d_W);
-int mstmm_sweep_generic6_answered_slope(const real *restrict y, const real *restrict z,
+int mstmm_sweep_generic6_add_known_part_slope(const real *restrict y, const real *restrict z,
     const real *restrict d_y, const real *restrict d_z, real *restrict d_l);
-int mstmm_sweep_generic6_pull_slope(const real *restrict y, const real *restrict x,
+int mstmm_sweep_generic6_add_multiplier_effort_slope(const real *restrict y, const real *restrict x,
     const real *restrict d_y, const real *restrict d_x, real *restrict d_y_0);
 
 extern const mstmm_element mstmm_sweep_laws;
@@ -1516,7 +1535,7 @@ int mstmm_sweep_link_screw_rotor_recover(const real *restrict link, const real *
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
 extern const mstmm_element mstmm_sweep_loops;
-int mstmm_sweep_loops_meet(const real *restrict A_C, const real *restrict x_C,
+int mstmm_sweep_loops_relative_pose(const real *restrict A_C, const real *restrict x_C,
     const real *restrict A_B, const real *restrict x_B, const real *restrict r_e,
     const real *restrict Rc, const real *restrict r, real *restrict R_C, real *restrict r_A,
     real *restrict d);
@@ -1528,35 +1547,38 @@ int mstmm_sweep_loops_slip(const real *restrict R_C, const real *restrict r_e,
 int mstmm_sweep_loops_drift(const real *restrict R_C, const real *restrict r_e,
     const real *restrict d, const real *restrict slip, const real *restrict motion_C,
     const real *restrict motion_B, real *restrict drift);
-int mstmm_sweep_loops_closing(const real *restrict gap, const real *restrict rate,
+int mstmm_sweep_loops_required_acceleration(const real *restrict gap, const real *restrict rate,
     real *restrict relative);
 int mstmm_sweep_loops_row(const real *restrict w, const real *restrict R_C,
     const real *restrict r_e, const real *restrict Rc, const real *restrict r_A, real *restrict J_A,
     real *restrict J_B);
-int mstmm_sweep_loops_known(const real *restrict W, const real *restrict relative, real *restrict l);
-int mstmm_sweep_loops_told(const real *restrict J_A, const real *restrict J_B,
+int mstmm_sweep_loops_known_parts(const real *restrict W, const real *restrict relative,
+    real *restrict l);
+int mstmm_sweep_loops_row_acceleration(const real *restrict J_A, const real *restrict J_B,
     const real *restrict l, const real *restrict delta_A, const real *restrict delta_B,
     real *restrict c);
-int mstmm_sweep_loops_act(const real *restrict J, const real *restrict tau, real *restrict e);
-int mstmm_sweep_loops_settle(const real *restrict L, const real *restrict floor_,
+int mstmm_sweep_loops_apply_effort(const real *restrict J, const real *restrict tau,
+    real *restrict e);
+int mstmm_sweep_loops_pivot_inverse(const real *restrict L, const real *restrict floor_,
     real *restrict inverse);
-int mstmm_sweep_loops_close(const real *restrict inverse, const real *restrict K,
+int mstmm_sweep_loops_eliminate_row(const real *restrict inverse, const real *restrict K,
     const real *restrict l, real *restrict S, real *restrict e);
-int mstmm_sweep_loops_shed(const real *restrict inverse, const real *restrict K,
+int mstmm_sweep_loops_update_column(const real *restrict inverse, const real *restrict K,
     const real *restrict L_p, real *restrict K_p);
-int mstmm_sweep_loops_shed_known(const real *restrict inverse, const real *restrict l,
+int mstmm_sweep_loops_update_known_part(const real *restrict inverse, const real *restrict l,
     const real *restrict L_p, real *restrict l_p);
-int mstmm_sweep_loops_shed_pair(const real *restrict inverse, const real *restrict L_p,
+int mstmm_sweep_loops_update_coupling(const real *restrict inverse, const real *restrict L_p,
     const real *restrict L_q, real *restrict L_pq);
 int mstmm_sweep_loops_multiplier(const real *restrict inverse, const real *restrict l,
     real *restrict x);
-int mstmm_sweep_loops_multiplier_more(const real *restrict inverse, const real *restrict K,
+int mstmm_sweep_loops_multiplier_of_motion(const real *restrict inverse, const real *restrict K,
     const real *restrict delta, real *restrict x);
-int mstmm_sweep_loops_multiplier_less(const real *restrict inverse, const real *restrict L_p,
+int mstmm_sweep_loops_multiplier_of_row(const real *restrict inverse, const real *restrict L_p,
     const real *restrict x_p, real *restrict x);
-int mstmm_sweep_loops_yielded(const real *restrict softness, const real *restrict s,
+int mstmm_sweep_loops_rotor_row_residual(const real *restrict softness, const real *restrict s,
     const real *restrict x, real *restrict l);
-int mstmm_sweep_loops_loaded(const real *restrict K, const real *restrict x, real *restrict e);
+int mstmm_sweep_loops_apply_multiplier(const real *restrict K, const real *restrict x,
+    real *restrict e);
 int mstmm_sweep_loops_distance(const real *restrict p, const real *restrict d, real *restrict W,
     real *restrict gap);
 int mstmm_sweep_loops_distance_drift(const real *restrict d, const real *restrict slip,
@@ -1567,7 +1589,7 @@ int mstmm_sweep_loops_rolling(const real *restrict p, const real *restrict R_C,
     const real *restrict d, real *restrict W, real *restrict gap);
 int mstmm_sweep_loops_rolling_drift(const real *restrict p, const real *restrict R_C,
     const real *restrict slip, real *restrict drift);
-int mstmm_sweep_loops_meet_slope(const real *restrict A_C, const real *restrict x_C,
+int mstmm_sweep_loops_relative_pose_slope(const real *restrict A_C, const real *restrict x_C,
     const real *restrict A_B, const real *restrict x_B, const real *restrict r_e,
     const real *restrict Rc, const real *restrict r, const real *restrict d_A_C,
     const real *restrict d_x_C, const real *restrict d_A_B, const real *restrict d_x_B,
@@ -1587,11 +1609,11 @@ int mstmm_sweep_loops_row_slope(const real *restrict w, const real *restrict R_C
     const real *restrict r_e, const real *restrict Rc, const real *restrict r_A,
     const real *restrict d_w, const real *restrict d_R_C, const real *restrict d_Rc,
     const real *restrict d_r_A, real *restrict d_J_A, real *restrict d_J_B);
-int mstmm_sweep_loops_known_slope(const real *restrict W, const real *restrict relative,
+int mstmm_sweep_loops_known_parts_slope(const real *restrict W, const real *restrict relative,
     const real *restrict d_W, const real *restrict d_relative, real *restrict d_l);
-int mstmm_sweep_loops_act_slope(const real *restrict J, const real *restrict tau,
+int mstmm_sweep_loops_apply_effort_slope(const real *restrict J, const real *restrict tau,
     const real *restrict d_J, const real *restrict d_tau, real *restrict d_e);
-int mstmm_sweep_loops_loaded_slope(const real *restrict K, const real *restrict x,
+int mstmm_sweep_loops_apply_multiplier_slope(const real *restrict K, const real *restrict x,
     const real *restrict d_K, const real *restrict d_x, real *restrict d_e);
 int mstmm_sweep_loops_distance_slope(const real *restrict p, const real *restrict d,
     const real *restrict d_d, real *restrict d_W);
@@ -1633,19 +1655,19 @@ int mstmm_sweep_modal_section(int n, const real *restrict r, const real *restric
     const real *restrict h_z, const real *restrict eta, const real *restrict etad,
     real *restrict Phi, real *restrict x, real *restrict Psi, real *restrict xd,
     real *restrict Psid, real *restrict xdd, real *restrict Psidd);
-int mstmm_sweep_modal_outward(const real *restrict R_end, const real *restrict x,
+int mstmm_sweep_modal_end_motion(const real *restrict R_end, const real *restrict x,
     const real *restrict Psi, const real *restrict xd, const real *restrict Psid,
     const real *restrict xdd, const real *restrict Psidd, real *restrict R, real *restrict d,
     real *restrict H6, real *restrict v, real *restrict w, real *restrict c);
-int mstmm_sweep_modal_inward(const real *restrict R_end, const real *restrict x,
+int mstmm_sweep_modal_frame_motion(const real *restrict R_end, const real *restrict x,
     const real *restrict Psi, const real *restrict xd, const real *restrict Psid,
     const real *restrict xdd, const real *restrict Psidd, real *restrict R, real *restrict d,
     real *restrict H6, real *restrict v, real *restrict w, real *restrict c);
 int mstmm_sweep_modal_subspace(int n, const real *restrict H6, const real *restrict Phi,
     real *restrict H);
-int mstmm_sweep_modal_imposed(int n, const real *restrict H, const real *restrict s,
+int mstmm_sweep_modal_prescribed_bias(int n, const real *restrict H, const real *restrict s,
     const real *restrict c, real *restrict c_s);
-int mstmm_sweep_modal_absorb(int n, const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_modal_assemble_port(int n, const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict S, const real *restrict e, real *restrict U,
     real *restrict S_rf, real *restrict S_ff, real *restrict e_f);
 int mstmm_sweep_modal_rebase(int n, const real *restrict H, const real *restrict S,
@@ -1657,29 +1679,29 @@ int mstmm_sweep_modal_condense(int n, const real *restrict S, const real *restri
     real *restrict work);
 int mstmm_sweep_modal_recover(int n, const real *restrict Gg, const real *restrict delta_I,
     real *restrict etadd);
-int mstmm_sweep_modal_displaced(int n, const real *restrict H, const real *restrict etadd,
+int mstmm_sweep_modal_port_deviation(int n, const real *restrict H, const real *restrict etadd,
     const real *restrict delta_I, real *restrict delta);
-int mstmm_sweep_modal_prescribed(int n, const real *restrict S_rf, const real *restrict S_ff,
+int mstmm_sweep_modal_prescribed_load(int n, const real *restrict S_rf, const real *restrict S_ff,
     const real *restrict s, real *restrict e, real *restrict e_f);
 int mstmm_sweep_modal_modal_effort(int n, const real *restrict H, const real *restrict e,
     const real *restrict e_f, real *restrict tau);
-int mstmm_sweep_modal_pushed(int n, const real *restrict Gg, const real *restrict e,
+int mstmm_sweep_modal_column_load(int n, const real *restrict Gg, const real *restrict e,
     const real *restrict e_f, real *restrict e_c);
-int mstmm_sweep_modal_answer(int n, const real *restrict S_ff, const real *restrict e_f,
-    const real *restrict Gg, const real *restrict delta_I, real *restrict y, real *restrict etadd,
-    real *restrict work);
-int mstmm_sweep_modal_stiffened(int n, const real *restrict K, const real *restrict D,
+int mstmm_sweep_modal_column_acceleration(int n, const real *restrict S_ff,
+    const real *restrict e_f, const real *restrict Gg, const real *restrict delta_I,
+    real *restrict y, real *restrict etadd, real *restrict work);
+int mstmm_sweep_modal_step_stiffness(int n, const real *restrict K, const real *restrict D,
     const real *restrict rate, const real *restrict sq, real *restrict S_ff);
-int mstmm_sweep_modal_strained(int n, const real *restrict K, const real *restrict D,
+int mstmm_sweep_modal_strain_load(int n, const real *restrict K, const real *restrict D,
     const real *restrict eta, const real *restrict etad, real *restrict e_f);
-int mstmm_sweep_modal_row_felt(int n, const real *restrict H, const real *restrict K,
+int mstmm_sweep_modal_modal_column(int n, const real *restrict H, const real *restrict K,
     real *restrict K_f);
-int mstmm_sweep_modal_row_condensed(int n, const real *restrict S_ff, const real *restrict K_f,
+int mstmm_sweep_modal_condense_row(int n, const real *restrict S_ff, const real *restrict K_f,
     const real *restrict Gg, real *restrict Y, real *restrict K, real *restrict l_,
     real *restrict work);
-int mstmm_sweep_modal_row_coupled(int n, const real *restrict K_f, const real *restrict Y,
+int mstmm_sweep_modal_row_coupling(int n, const real *restrict K_f, const real *restrict Y,
     real *restrict L_ij);
-int mstmm_sweep_modal_row_answered(int n, const real *restrict Y, const real *restrict x,
+int mstmm_sweep_modal_multiplier_acceleration(int n, const real *restrict Y, const real *restrict x,
     real *restrict etadd);
 int mstmm_sweep_modal_residual_slope(int n, const real *restrict p, const real *restrict C,
     const real *restrict P, const real *restrict B, const real *restrict Z_xx,
@@ -1710,14 +1732,14 @@ int mstmm_sweep_modal_section_slope(int n, const real *restrict r, const real *r
     const real *restrict Phi, const real *restrict d_eta, const real *restrict d_etad,
     real *restrict d_Phi, real *restrict d_x, real *restrict d_Psi, real *restrict d_xd,
     real *restrict d_Psid, real *restrict d_xdd, real *restrict d_Psidd);
-int mstmm_sweep_modal_outward_slope(const real *restrict R_end, const real *restrict x,
+int mstmm_sweep_modal_end_motion_slope(const real *restrict R_end, const real *restrict x,
     const real *restrict Psi, const real *restrict xd, const real *restrict Psid,
     const real *restrict xdd, const real *restrict Psidd, const real *restrict d_x,
     const real *restrict d_Psi, const real *restrict d_xd, const real *restrict d_Psid,
     const real *restrict d_xdd, const real *restrict d_Psidd, real *restrict d_R,
     real *restrict d_d, real *restrict d_H6, real *restrict d_v, real *restrict d_w,
     real *restrict d_c);
-int mstmm_sweep_modal_inward_slope(const real *restrict R_end, const real *restrict x,
+int mstmm_sweep_modal_frame_motion_slope(const real *restrict R_end, const real *restrict x,
     const real *restrict Psi, const real *restrict xd, const real *restrict Psid,
     const real *restrict xdd, const real *restrict Psidd, const real *restrict d_x,
     const real *restrict d_Psi, const real *restrict d_xd, const real *restrict d_Psid,
@@ -1726,12 +1748,12 @@ int mstmm_sweep_modal_inward_slope(const real *restrict R_end, const real *restr
     real *restrict d_c);
 int mstmm_sweep_modal_subspace_slope(int n, const real *restrict H6, const real *restrict Phi,
     const real *restrict d_H6, const real *restrict d_Phi, real *restrict d_H);
-int mstmm_sweep_modal_imposed_slope(int n, const real *restrict H, const real *restrict s,
+int mstmm_sweep_modal_prescribed_bias_slope(int n, const real *restrict H, const real *restrict s,
     const real *restrict c, const real *restrict d_H, const real *restrict d_s,
     const real *restrict d_c, real *restrict d_c_s);
-int mstmm_sweep_modal_prescribed_slope(int n, const real *restrict S_rf, const real *restrict S_ff,
-    const real *restrict s, const real *restrict d_S_rf, const real *restrict d_s,
-    real *restrict d_e, real *restrict d_e_f);
+int mstmm_sweep_modal_prescribed_load_slope(int n, const real *restrict S_rf,
+    const real *restrict S_ff, const real *restrict s, const real *restrict d_S_rf,
+    const real *restrict d_s, real *restrict d_e, real *restrict d_e_f);
 int mstmm_sweep_modal_modal_effort_slope(int n, const real *restrict H, const real *restrict e,
     const real *restrict e_f, const real *restrict d_H, const real *restrict d_e,
     const real *restrict d_e_f, real *restrict d_tau);
@@ -1750,7 +1772,7 @@ int mstmm_sweep_planar_pin_velocity(const real *restrict Rc, const real *restric
 int mstmm_sweep_planar_pin_point(const real *restrict A, const real *restrict x,
     const real *restrict v, const real *restrict motion, const real *restrict offset,
     real *restrict x_K, real *restrict v_K);
-int mstmm_sweep_planar_pin_turning(const real *restrict A, const real *restrict motion,
+int mstmm_sweep_planar_pin_angular_motion(const real *restrict A, const real *restrict motion,
     real *restrict w_K);
 int mstmm_sweep_planar_pin_end_frame(const real *restrict A, const real *restrict R_end,
     real *restrict A_end);
@@ -1759,21 +1781,22 @@ int mstmm_sweep_planar_pin_applied_load(const real *restrict A, const real *rest
 int mstmm_sweep_planar_pin_factor(const real *restrict Rc, const real *restrict r,
     const real *restrict J, const real *restrict floor_, const real *restrict S, real *restrict F,
     real *restrict G, real *restrict S_I);
-int mstmm_sweep_planar_pin_push(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_planar_pin_column_load(const real *restrict Rc, const real *restrict r,
     const real *restrict G, const real *restrict e, const real *restrict tau, real *restrict y,
     real *restrict e_I);
-int mstmm_sweep_planar_pin_answer(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_planar_pin_column_acceleration(const real *restrict Rc, const real *restrict r,
     const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_sweep_planar_pin_divide(const real *restrict F, const real *restrict y, real *restrict z);
 int mstmm_sweep_planar_pin_couple(const real *restrict y, const real *restrict z,
     real *restrict L_ij);
-int mstmm_sweep_planar_pin_answered(const real *restrict y, const real *restrict z,
+int mstmm_sweep_planar_pin_add_known_part(const real *restrict y, const real *restrict z,
     real *restrict l);
-int mstmm_sweep_planar_pin_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
-int mstmm_sweep_planar_pin_push_on_ground(const real *restrict e, const real *restrict tau,
+int mstmm_sweep_planar_pin_add_multiplier_effort(const real *restrict y, const real *restrict x,
+    real *restrict y_0);
+int mstmm_sweep_planar_pin_ground_column_load(const real *restrict e, const real *restrict tau,
     real *restrict y);
-int mstmm_sweep_planar_pin_meet(const real *restrict A_C, const real *restrict x_C,
+int mstmm_sweep_planar_pin_relative_pose(const real *restrict A_C, const real *restrict x_C,
     const real *restrict A_B, const real *restrict x_B, const real *restrict r_e,
     const real *restrict Rc, const real *restrict r, real *restrict R_C, real *restrict r_A,
     real *restrict d);
@@ -1786,18 +1809,19 @@ int mstmm_sweep_planar_pin_drift(const real *restrict R_C, const real *restrict 
 int mstmm_sweep_planar_pin_row(const real *restrict w, const real *restrict R_C,
     const real *restrict r_e, const real *restrict Rc, const real *restrict r_A, real *restrict J_A,
     real *restrict J_B);
-int mstmm_sweep_planar_pin_known(const real *restrict W, const real *restrict relative,
+int mstmm_sweep_planar_pin_known_parts(const real *restrict W, const real *restrict relative,
     real *restrict l);
-int mstmm_sweep_planar_pin_told(const real *restrict J_A, const real *restrict J_B,
+int mstmm_sweep_planar_pin_row_acceleration(const real *restrict J_A, const real *restrict J_B,
     const real *restrict l, const real *restrict delta_A, const real *restrict delta_B,
     real *restrict c);
-int mstmm_sweep_planar_pin_act(const real *restrict J, const real *restrict tau, real *restrict e);
-int mstmm_sweep_planar_pin_close(const real *restrict inverse, const real *restrict K,
+int mstmm_sweep_planar_pin_apply_effort(const real *restrict J, const real *restrict tau,
+    real *restrict e);
+int mstmm_sweep_planar_pin_eliminate_row(const real *restrict inverse, const real *restrict K,
     const real *restrict l, real *restrict S, real *restrict e);
-int mstmm_sweep_planar_pin_shed(const real *restrict inverse, const real *restrict K,
+int mstmm_sweep_planar_pin_update_column(const real *restrict inverse, const real *restrict K,
     const real *restrict L_p, real *restrict K_p);
-int mstmm_sweep_planar_pin_multiplier_more(const real *restrict inverse, const real *restrict K,
-    const real *restrict delta, real *restrict x);
+int mstmm_sweep_planar_pin_multiplier_of_motion(const real *restrict inverse,
+    const real *restrict K, const real *restrict delta, real *restrict x);
 
 extern const mstmm_element mstmm_sweep_qr;
 int mstmm_sweep_qr_factor(const real *restrict S, real *restrict U);
@@ -1806,8 +1830,8 @@ int mstmm_sweep_qr_bias(const real *restrict U, const real *restrict motion, rea
 int mstmm_sweep_qr_merge(const real *restrict Rc, const real *restrict r, const real *restrict V,
     const real *restrict d_V, const real *restrict e_Q, const real *restrict U_P,
     const real *restrict d_P, real *restrict U, real *restrict d, real *restrict e_I);
-int mstmm_sweep_qr_restored(const real *restrict U, const real *restrict d, const real *restrict e,
-    real *restrict S, real *restrict e_S);
+int mstmm_sweep_qr_rows_to_riccati(const real *restrict U, const real *restrict d,
+    const real *restrict e, real *restrict S, real *restrict e_S);
 
 extern const mstmm_element mstmm_sweep_tangent;
 int mstmm_sweep_tangent_invert(int n, const real *restrict D, const real *restrict one,
@@ -1816,22 +1840,22 @@ int mstmm_sweep_tangent_node(int n, const real *restrict H, const real *restrict
     const real *restrict G, const real *restrict W, const real *restrict S, const real *restrict K,
     const real *restrict Z_z, const real *restrict Z_x, real *restrict V, real *restrict D,
     real *restrict right, real *restrict gain, real *restrict S_c, real *restrict work);
-int mstmm_sweep_tangent_absorb(int n, const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_tangent_assemble_port(int n, const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict B, const real *restrict G, const real *restrict W,
     const real *restrict S, const real *restrict T, real *restrict K_x, real *restrict K,
     real *restrict Z_z, real *restrict Z_x);
-int mstmm_sweep_tangent_push(int n, const real *restrict H, const real *restrict V,
+int mstmm_sweep_tangent_column_load(int n, const real *restrict H, const real *restrict V,
     const real *restrict D, const real *restrict e, const real *restrict e_f, real *restrict rest,
     real *restrict y, real *restrict e_c, real *restrict work);
-int mstmm_sweep_tangent_answer(int n, const real *restrict B, const real *restrict gain,
+int mstmm_sweep_tangent_column_solution(int n, const real *restrict B, const real *restrict gain,
     const real *restrict y, const real *restrict z_c, real *restrict x, real *restrict z);
-int mstmm_sweep_tangent_displaced(int n, const real *restrict B, const real *restrict x,
+int mstmm_sweep_tangent_port_motion(int n, const real *restrict B, const real *restrict x,
     const real *restrict z_c, real *restrict z);
-int mstmm_sweep_tangent_lag(int n, const real *restrict sq, const real *restrict kappa,
+int mstmm_sweep_tangent_increment_matrix(int n, const real *restrict sq, const real *restrict kappa,
     const real *restrict one, const real *restrict g_q, real *restrict A, real *restrict Q,
     real *restrict work);
-int mstmm_sweep_tangent_lagged(int n, const real *restrict Q, const real *restrict rate,
-    real *restrict dq);
+int mstmm_sweep_tangent_coordinate_increment(int n, const real *restrict Q,
+    const real *restrict rate, real *restrict dq);
 int mstmm_sweep_tangent_placed_rows(int n, const real *restrict H, const real *restrict S_p,
     real *restrict Z_p);
 int mstmm_sweep_tangent_placed_own(int n, const real *restrict B_p, const real *restrict S_p,
@@ -1841,10 +1865,10 @@ int mstmm_sweep_tangent_placed_reduce(int n, const real *restrict inverse, const
 int mstmm_sweep_tangent_placed_node(int n, const real *restrict H, const real *restrict V,
     const real *restrict D, const real *restrict S_p, const real *restrict Z_p,
     real *restrict right, real *restrict gain, real *restrict S_c, real *restrict work);
-int mstmm_sweep_tangent_placed_absorb(int n, const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_tangent_placed_port(int n, const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict B_p, const real *restrict S_p,
     const real *restrict T_p, real *restrict K, real *restrict Z_p, real *restrict Z_x);
-int mstmm_sweep_tangent_placed_left(int n, const real *restrict gain, const real *restrict p,
+int mstmm_sweep_tangent_placed_remainder(int n, const real *restrict gain, const real *restrict p,
     real *restrict y);
 
 #endif

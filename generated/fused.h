@@ -45,8 +45,8 @@ typedef struct {
     int (*required)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *a, double *efforts);
     int (*mass)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *a, double *M);
     /* A point of one body; see derive/fuse/point_kinematics.py. */
-    int (*placed)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *end, double *place, double *axes);
-    int (*moving)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *end, double *velocity);
+    int (*pose)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *end, double *place, double *axes);
+    int (*velocities)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *end, double *velocity);
     int (*jacobian)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *end, double *J);
     int (*jacobian_rate)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *end, double *J);
     /* The slopes of the residual about a state; see derive/fuse/linearisation.py. */

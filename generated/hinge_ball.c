@@ -32,7 +32,7 @@ int mstmm_hinge_ball_rates_by_coordinates(const real *restrict p, const real *re
     const real *restrict u, real *restrict J);
 int mstmm_hinge_ball_rates_by_speeds(const real *restrict p, const real *restrict q,
     const real *restrict u, real *restrict J);
-int mstmm_hinge_ball_forward_kept(const real *restrict p, const real *restrict q,
+int mstmm_hinge_ball_body_motion(const real *restrict p, const real *restrict q,
     const real *restrict u, const real *restrict Rt, const real *restrict ro,
     const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
     real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
@@ -1447,7 +1447,7 @@ static const mstmm_port mstmm_hinge_ball_rates_by_speeds_outputs[] = {
  * out r[3] (m) P of the body from P of the parent, parent axes
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  */
-int mstmm_hinge_ball_forward_kept(const real *restrict p, const real *restrict q,
+int mstmm_hinge_ball_body_motion(const real *restrict p, const real *restrict q,
     const real *restrict u, const real *restrict Rt, const real *restrict ro,
     const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
     real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
@@ -1726,13 +1726,13 @@ int mstmm_hinge_ball_forward_kept(const real *restrict p, const real *restrict q
     return 0;
 }
 
-static int mstmm_hinge_ball_forward_kept_call(int n, const real *const *in, real *const *out)
+static int mstmm_hinge_ball_body_motion_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_hinge_ball_forward_kept(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]);
+    return mstmm_hinge_ball_body_motion(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]);
 }
 
-static const mstmm_port mstmm_hinge_ball_forward_kept_inputs[] = {
+static const mstmm_port mstmm_hinge_ball_body_motion_inputs[] = {
     {"p", 0, "", 0, 0},
     {"q", 4, "", 0, 0},
     {"u", 3, "", 0, 0},
@@ -1742,7 +1742,7 @@ static const mstmm_port mstmm_hinge_ball_forward_kept_inputs[] = {
     {"motion_I", 9, "", 0, 0},
 };
 
-static const mstmm_port mstmm_hinge_ball_forward_kept_outputs[] = {
+static const mstmm_port mstmm_hinge_ball_body_motion_outputs[] = {
     {"R", 9, "", 0, 0},
     {"d", 3, "m", 0, 0},
     {"H", 18, "", 0, 0},
@@ -1763,7 +1763,7 @@ static const mstmm_port mstmm_hinge_ball_forward_kept_outputs[] = {
  * in  u[3] speeds: wx [rad/s], wy [rad/s], wz [rad/s]
  * in  s[3] accelerations of the speeds
  * in  motion[9] w, wd, and a of the body, own axes
- * in  f[6] (N, N*m) load at P that is carried
+ * in  f[6] (N, N*m) carried load at P
  * in  J[3] (kg*m2 or kg) rotor inertia reflected to the speeds
  * in  laws[3][3] change of the laws' efforts, a row a direction
  * in  along[3][4] change of the coordinates, a row a direction
@@ -1771,7 +1771,7 @@ static const mstmm_port mstmm_hinge_ball_forward_kept_outputs[] = {
  * in  scale[1] (1/s) and of its acceleration
  * in  sq[1] (1/s) inverse time by which coordinates follow speeds
  * out B[3][9] motion along the unknowns, a row a direction
- * out G[3][6] change of the load that is carried
+ * out G[3][6] change of the carried load
  * out W[3][3] slopes of the rows by load, rotors and laws
  * out H[6][3] motion subspace, rows v then w, P axes
  */
@@ -2489,14 +2489,14 @@ static const mstmm_kernel mstmm_hinge_ball_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "forward_kept",
-        .function = (void (*)(void))mstmm_hinge_ball_forward_kept,
-        .call = mstmm_hinge_ball_forward_kept_call,
+        .name = "body_motion",
+        .function = (void (*)(void))mstmm_hinge_ball_body_motion,
+        .call = mstmm_hinge_ball_body_motion_call,
         .n_inputs = 7,
         .n_outputs = 10,
-        .inputs = mstmm_hinge_ball_forward_kept_inputs,
-        .outputs = mstmm_hinge_ball_forward_kept_outputs,
-        .ir_hash = "7ca24593849cab654ccda302a8f5b0447ad8e68a903835bf0bfc38c97a6dd3d0",
+        .inputs = mstmm_hinge_ball_body_motion_inputs,
+        .outputs = mstmm_hinge_ball_body_motion_outputs,
+        .ir_hash = "239ad935da777dea0cd54510b521635041cad729779c0782512bf2605fffd598",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -2508,7 +2508,7 @@ static const mstmm_kernel mstmm_hinge_ball_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_hinge_ball_directions_inputs,
         .outputs = mstmm_hinge_ball_directions_outputs,
-        .ir_hash = "8fc42daa3148d9c26307e57b81dee4501fa9a24e0caeb12d2254c7554456757f",
+        .ir_hash = "dc43523e7c2fd797bd9de94d89ed1245d16ca897d6f8557e5bcf03dc4ae1d50c",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -2518,7 +2518,7 @@ const mstmm_element mstmm_hinge_ball = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "ball",
-    .hash = "4a0ec17d95795bc7eb40c95be5db8df1a7e05b7a965d75f65e9942640e09fa6f",
+    .hash = "5daa38496191ea57c9f2cae84026c024fc69d8b9b79b089f7f0d4e12e27a5ad3",
     .nq = 4,
     .nu = 3,
     .np = 0,

@@ -31,7 +31,7 @@ int mstmm_hinge_cylindrical_rates_by_coordinates(const real *restrict p, const r
     const real *restrict u, real *restrict J);
 int mstmm_hinge_cylindrical_rates_by_speeds(const real *restrict p, const real *restrict q,
     const real *restrict u, real *restrict J);
-int mstmm_hinge_cylindrical_forward_kept(const real *restrict p, const real *restrict q,
+int mstmm_hinge_cylindrical_body_motion(const real *restrict p, const real *restrict q,
     const real *restrict u, const real *restrict Rt, const real *restrict ro,
     const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
     real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
@@ -1108,7 +1108,7 @@ static const mstmm_port mstmm_hinge_cylindrical_rates_by_speeds_outputs[] = {
  * out r[3] (m) P of the body from P of the parent, parent axes
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  */
-int mstmm_hinge_cylindrical_forward_kept(const real *restrict p, const real *restrict q,
+int mstmm_hinge_cylindrical_body_motion(const real *restrict p, const real *restrict q,
     const real *restrict u, const real *restrict Rt, const real *restrict ro,
     const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
     real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
@@ -1295,13 +1295,13 @@ int mstmm_hinge_cylindrical_forward_kept(const real *restrict p, const real *res
     return 0;
 }
 
-static int mstmm_hinge_cylindrical_forward_kept_call(int n, const real *const *in, real *const *out)
+static int mstmm_hinge_cylindrical_body_motion_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_hinge_cylindrical_forward_kept(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]);
+    return mstmm_hinge_cylindrical_body_motion(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]);
 }
 
-static const mstmm_port mstmm_hinge_cylindrical_forward_kept_inputs[] = {
+static const mstmm_port mstmm_hinge_cylindrical_body_motion_inputs[] = {
     {"p", 0, "", 0, 0},
     {"q", 2, "", 0, 0},
     {"u", 2, "", 0, 0},
@@ -1311,7 +1311,7 @@ static const mstmm_port mstmm_hinge_cylindrical_forward_kept_inputs[] = {
     {"motion_I", 9, "", 0, 0},
 };
 
-static const mstmm_port mstmm_hinge_cylindrical_forward_kept_outputs[] = {
+static const mstmm_port mstmm_hinge_cylindrical_body_motion_outputs[] = {
     {"R", 9, "", 0, 0},
     {"d", 3, "m", 0, 0},
     {"H", 12, "", 0, 0},
@@ -1332,7 +1332,7 @@ static const mstmm_port mstmm_hinge_cylindrical_forward_kept_outputs[] = {
  * in  u[2] speeds: displacement_rate [m/s], angle_rate [rad/s]
  * in  s[2] accelerations of the speeds
  * in  motion[9] w, wd, and a of the body, own axes
- * in  f[6] (N, N*m) load at P that is carried
+ * in  f[6] (N, N*m) carried load at P
  * in  J[2] (kg*m2 or kg) rotor inertia reflected to the speeds
  * in  laws[2][2] change of the laws' efforts, a row a direction
  * in  along[2][2] change of the coordinates, a row a direction
@@ -1340,7 +1340,7 @@ static const mstmm_port mstmm_hinge_cylindrical_forward_kept_outputs[] = {
  * in  scale[1] (1/s) and of its acceleration
  * in  sq[1] (1/s) inverse time by which coordinates follow speeds
  * out B[2][9] motion along the unknowns, a row a direction
- * out G[2][6] change of the load that is carried
+ * out G[2][6] change of the carried load
  * out W[2][2] slopes of the rows by load, rotors and laws
  * out H[6][2] motion subspace, rows v then w, P axes
  */
@@ -1591,14 +1591,14 @@ static const mstmm_kernel mstmm_hinge_cylindrical_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "forward_kept",
-        .function = (void (*)(void))mstmm_hinge_cylindrical_forward_kept,
-        .call = mstmm_hinge_cylindrical_forward_kept_call,
+        .name = "body_motion",
+        .function = (void (*)(void))mstmm_hinge_cylindrical_body_motion,
+        .call = mstmm_hinge_cylindrical_body_motion_call,
         .n_inputs = 7,
         .n_outputs = 10,
-        .inputs = mstmm_hinge_cylindrical_forward_kept_inputs,
-        .outputs = mstmm_hinge_cylindrical_forward_kept_outputs,
-        .ir_hash = "3f006b5c58228922f72ef692d6a940b8ea8c627dd6a14d8a27df3e65a95f1ac3",
+        .inputs = mstmm_hinge_cylindrical_body_motion_inputs,
+        .outputs = mstmm_hinge_cylindrical_body_motion_outputs,
+        .ir_hash = "9bf891c468b41f508b203345a5a7d9e174b1944952cd53c17040bbae3f5aa4c8",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1610,7 +1610,7 @@ static const mstmm_kernel mstmm_hinge_cylindrical_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_hinge_cylindrical_directions_inputs,
         .outputs = mstmm_hinge_cylindrical_directions_outputs,
-        .ir_hash = "7f3445add3751e8594236ceb03fa331961b367dbaa1f263e9c5e64ba882c1f86",
+        .ir_hash = "75f22788a370184c59fb3a5c3a7562f6b910bc182b3e71bb3a1d334fcaad073c",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1620,7 +1620,7 @@ const mstmm_element mstmm_hinge_cylindrical = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "cylindrical",
-    .hash = "8a4a63c17eabd9a5cc181ffc1c86da2f3264cbf2f514400f6c59af3e97ea0686",
+    .hash = "3f669a307ad0a5521ad8cbd56b4cb33f5866a9cff2234edc8f7756eb17e1bdd4",
     .nq = 2,
     .nu = 2,
     .np = 0,

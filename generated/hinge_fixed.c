@@ -26,7 +26,7 @@ int mstmm_hinge_fixed_hinge_slope(const real *restrict p, const real *restrict q
     const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
     real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
     real *restrict d_c, real *restrict d_qdot);
-int mstmm_hinge_fixed_forward_kept(const real *restrict p, const real *restrict q,
+int mstmm_hinge_fixed_body_motion(const real *restrict p, const real *restrict q,
     const real *restrict u, const real *restrict Rt, const real *restrict ro,
     const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
     real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
@@ -919,7 +919,7 @@ static const mstmm_port mstmm_hinge_fixed_hinge_slope_outputs[] = {
  * out r[3] (m) P of the body from P of the parent, parent axes
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  */
-int mstmm_hinge_fixed_forward_kept(const real *restrict p, const real *restrict q,
+int mstmm_hinge_fixed_body_motion(const real *restrict p, const real *restrict q,
     const real *restrict u, const real *restrict Rt, const real *restrict ro,
     const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
     real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
@@ -1057,13 +1057,13 @@ int mstmm_hinge_fixed_forward_kept(const real *restrict p, const real *restrict 
     return 0;
 }
 
-static int mstmm_hinge_fixed_forward_kept_call(int n, const real *const *in, real *const *out)
+static int mstmm_hinge_fixed_body_motion_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_hinge_fixed_forward_kept(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]);
+    return mstmm_hinge_fixed_body_motion(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]);
 }
 
-static const mstmm_port mstmm_hinge_fixed_forward_kept_inputs[] = {
+static const mstmm_port mstmm_hinge_fixed_body_motion_inputs[] = {
     {"p", 0, "", 0, 0},
     {"q", 0, "", 0, 0},
     {"u", 0, "", 0, 0},
@@ -1073,7 +1073,7 @@ static const mstmm_port mstmm_hinge_fixed_forward_kept_inputs[] = {
     {"motion_I", 9, "", 0, 0},
 };
 
-static const mstmm_port mstmm_hinge_fixed_forward_kept_outputs[] = {
+static const mstmm_port mstmm_hinge_fixed_body_motion_outputs[] = {
     {"R", 9, "", 0, 0},
     {"d", 3, "m", 0, 0},
     {"H", 0, "", 0, 0},
@@ -1148,14 +1148,14 @@ static const mstmm_kernel mstmm_hinge_fixed_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "forward_kept",
-        .function = (void (*)(void))mstmm_hinge_fixed_forward_kept,
-        .call = mstmm_hinge_fixed_forward_kept_call,
+        .name = "body_motion",
+        .function = (void (*)(void))mstmm_hinge_fixed_body_motion,
+        .call = mstmm_hinge_fixed_body_motion_call,
         .n_inputs = 7,
         .n_outputs = 10,
-        .inputs = mstmm_hinge_fixed_forward_kept_inputs,
-        .outputs = mstmm_hinge_fixed_forward_kept_outputs,
-        .ir_hash = "4505fb5e008869329c929c102b13baae8dfc0472bbf6495ddbc4b4c11233f790",
+        .inputs = mstmm_hinge_fixed_body_motion_inputs,
+        .outputs = mstmm_hinge_fixed_body_motion_outputs,
+        .ir_hash = "93be3e618776c0b558e2534fc1d0e01b93c5c8294c78dca003c346923838ddc9",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1165,7 +1165,7 @@ const mstmm_element mstmm_hinge_fixed = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "fixed",
-    .hash = "256e8758c80cdbefa6c9dabfd940aaf67166894880b32a3950eabbc77720eb06",
+    .hash = "f963810d89b3dd4ed37d6dd2011260a9fad5c5ec637a958f92992f1a24787b5b",
     .nq = 0,
     .nu = 0,
     .np = 0,

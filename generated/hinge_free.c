@@ -31,7 +31,7 @@ int mstmm_hinge_free_rates_by_coordinates(const real *restrict p, const real *re
     const real *restrict u, real *restrict J);
 int mstmm_hinge_free_rates_by_speeds(const real *restrict p, const real *restrict q,
     const real *restrict u, real *restrict J);
-int mstmm_hinge_free_forward_kept(const real *restrict p, const real *restrict q,
+int mstmm_hinge_free_body_motion(const real *restrict p, const real *restrict q,
     const real *restrict u, const real *restrict Rt, const real *restrict ro,
     const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
     real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
@@ -2232,7 +2232,7 @@ static const mstmm_port mstmm_hinge_free_rates_by_speeds_outputs[] = {
  * out r[3] (m) P of the body from P of the parent, parent axes
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  */
-int mstmm_hinge_free_forward_kept(const real *restrict p, const real *restrict q,
+int mstmm_hinge_free_body_motion(const real *restrict p, const real *restrict q,
     const real *restrict u, const real *restrict Rt, const real *restrict ro,
     const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
     real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
@@ -2604,13 +2604,13 @@ int mstmm_hinge_free_forward_kept(const real *restrict p, const real *restrict q
     return 0;
 }
 
-static int mstmm_hinge_free_forward_kept_call(int n, const real *const *in, real *const *out)
+static int mstmm_hinge_free_body_motion_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_hinge_free_forward_kept(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]);
+    return mstmm_hinge_free_body_motion(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]);
 }
 
-static const mstmm_port mstmm_hinge_free_forward_kept_inputs[] = {
+static const mstmm_port mstmm_hinge_free_body_motion_inputs[] = {
     {"p", 0, "", 0, 0},
     {"q", 7, "", 0, 0},
     {"u", 6, "", 0, 0},
@@ -2620,7 +2620,7 @@ static const mstmm_port mstmm_hinge_free_forward_kept_inputs[] = {
     {"motion_I", 9, "", 0, 0},
 };
 
-static const mstmm_port mstmm_hinge_free_forward_kept_outputs[] = {
+static const mstmm_port mstmm_hinge_free_body_motion_outputs[] = {
     {"R", 9, "", 0, 0},
     {"d", 3, "m", 0, 0},
     {"H", 36, "", 0, 0},
@@ -2641,7 +2641,7 @@ static const mstmm_port mstmm_hinge_free_forward_kept_outputs[] = {
  * in  u[6] speeds: vx [m/s], vy [m/s], vz [m/s], wx [rad/s], wy [rad/s], wz [rad/s]
  * in  s[6] accelerations of the speeds
  * in  motion[9] w, wd, and a of the body, own axes
- * in  f[6] (N, N*m) load at P that is carried
+ * in  f[6] (N, N*m) carried load at P
  * in  J[6] (kg*m2 or kg) rotor inertia reflected to the speeds
  * in  laws[6][6] change of the laws' efforts, a row a direction
  * in  along[6][7] change of the coordinates, a row a direction
@@ -2649,7 +2649,7 @@ static const mstmm_port mstmm_hinge_free_forward_kept_outputs[] = {
  * in  scale[1] (1/s) and of its acceleration
  * in  sq[1] (1/s) inverse time by which coordinates follow speeds
  * out B[6][9] motion along the unknowns, a row a direction
- * out G[6][6] change of the load that is carried
+ * out G[6][6] change of the carried load
  * out W[6][6] slopes of the rows by load, rotors and laws
  * out H[6][6] motion subspace, rows v then w, P axes
  */
@@ -4405,14 +4405,14 @@ static const mstmm_kernel mstmm_hinge_free_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "forward_kept",
-        .function = (void (*)(void))mstmm_hinge_free_forward_kept,
-        .call = mstmm_hinge_free_forward_kept_call,
+        .name = "body_motion",
+        .function = (void (*)(void))mstmm_hinge_free_body_motion,
+        .call = mstmm_hinge_free_body_motion_call,
         .n_inputs = 7,
         .n_outputs = 10,
-        .inputs = mstmm_hinge_free_forward_kept_inputs,
-        .outputs = mstmm_hinge_free_forward_kept_outputs,
-        .ir_hash = "25394ea5a43dbd45a501d1d7d021efb7ee3f5cc1b0188d1fdf0ba47a2c19c04f",
+        .inputs = mstmm_hinge_free_body_motion_inputs,
+        .outputs = mstmm_hinge_free_body_motion_outputs,
+        .ir_hash = "1070516cdb03f9582f347f36abb5b24fcbeed6036aef048363a51ab666d706ca",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4424,7 +4424,7 @@ static const mstmm_kernel mstmm_hinge_free_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_hinge_free_directions_inputs,
         .outputs = mstmm_hinge_free_directions_outputs,
-        .ir_hash = "465fbb75381da31bc0b052714980235fe755bc55a8887fbe6a4a9515dfb52cbb",
+        .ir_hash = "769df7a6e1787bf2a2e0c1ebe472d20854f178f9b8a8e6a148822a7c074405ad",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4434,7 +4434,7 @@ const mstmm_element mstmm_hinge_free = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "free",
-    .hash = "18356146f3b5c5ac06f6f9ae3e1b1e426da1bcb248cd44786f030b3732b202dd",
+    .hash = "27987257501b4d52f00ead213b218dc68e809f730cc9969190aed89218f335d6",
     .nq = 7,
     .nu = 6,
     .np = 0,

@@ -33,7 +33,7 @@ int mstmm_hinge_gimbal_rates_by_coordinates(const real *restrict p, const real *
     const real *restrict u, real *restrict J);
 int mstmm_hinge_gimbal_rates_by_speeds(const real *restrict p, const real *restrict q,
     const real *restrict u, real *restrict J);
-int mstmm_hinge_gimbal_forward_kept(const real *restrict p, const real *restrict q,
+int mstmm_hinge_gimbal_body_motion(const real *restrict p, const real *restrict q,
     const real *restrict u, const real *restrict Rt, const real *restrict ro,
     const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
     real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
@@ -1717,7 +1717,7 @@ static const mstmm_port mstmm_hinge_gimbal_rates_by_speeds_outputs[] = {
  * out r[3] (m) P of the body from P of the parent, parent axes
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  */
-int mstmm_hinge_gimbal_forward_kept(const real *restrict p, const real *restrict q,
+int mstmm_hinge_gimbal_body_motion(const real *restrict p, const real *restrict q,
     const real *restrict u, const real *restrict Rt, const real *restrict ro,
     const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
     real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
@@ -1992,13 +1992,13 @@ int mstmm_hinge_gimbal_forward_kept(const real *restrict p, const real *restrict
     return 0;
 }
 
-static int mstmm_hinge_gimbal_forward_kept_call(int n, const real *const *in, real *const *out)
+static int mstmm_hinge_gimbal_body_motion_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_hinge_gimbal_forward_kept(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]);
+    return mstmm_hinge_gimbal_body_motion(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]);
 }
 
-static const mstmm_port mstmm_hinge_gimbal_forward_kept_inputs[] = {
+static const mstmm_port mstmm_hinge_gimbal_body_motion_inputs[] = {
     {"p", 0, "", 0, 0},
     {"q", 3, "", 0, 0},
     {"u", 3, "", 0, 0},
@@ -2008,7 +2008,7 @@ static const mstmm_port mstmm_hinge_gimbal_forward_kept_inputs[] = {
     {"motion_I", 9, "", 0, 0},
 };
 
-static const mstmm_port mstmm_hinge_gimbal_forward_kept_outputs[] = {
+static const mstmm_port mstmm_hinge_gimbal_body_motion_outputs[] = {
     {"R", 9, "", 0, 0},
     {"d", 3, "m", 0, 0},
     {"H", 18, "", 0, 0},
@@ -2029,7 +2029,7 @@ static const mstmm_port mstmm_hinge_gimbal_forward_kept_outputs[] = {
  * in  u[3] speeds: angle1_rate [rad/s], angle2_rate [rad/s], angle3_rate [rad/s]
  * in  s[3] accelerations of the speeds
  * in  motion[9] w, wd, and a of the body, own axes
- * in  f[6] (N, N*m) load at P that is carried
+ * in  f[6] (N, N*m) carried load at P
  * in  J[3] (kg*m2 or kg) rotor inertia reflected to the speeds
  * in  laws[3][3] change of the laws' efforts, a row a direction
  * in  along[3][3] change of the coordinates, a row a direction
@@ -2037,7 +2037,7 @@ static const mstmm_port mstmm_hinge_gimbal_forward_kept_outputs[] = {
  * in  scale[1] (1/s) and of its acceleration
  * in  sq[1] (1/s) inverse time by which coordinates follow speeds
  * out B[3][9] motion along the unknowns, a row a direction
- * out G[3][6] change of the load that is carried
+ * out G[3][6] change of the carried load
  * out W[3][3] slopes of the rows by load, rotors and laws
  * out H[6][3] motion subspace, rows v then w, P axes
  */
@@ -2612,14 +2612,14 @@ static const mstmm_kernel mstmm_hinge_gimbal_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "forward_kept",
-        .function = (void (*)(void))mstmm_hinge_gimbal_forward_kept,
-        .call = mstmm_hinge_gimbal_forward_kept_call,
+        .name = "body_motion",
+        .function = (void (*)(void))mstmm_hinge_gimbal_body_motion,
+        .call = mstmm_hinge_gimbal_body_motion_call,
         .n_inputs = 7,
         .n_outputs = 10,
-        .inputs = mstmm_hinge_gimbal_forward_kept_inputs,
-        .outputs = mstmm_hinge_gimbal_forward_kept_outputs,
-        .ir_hash = "936f7abf79f2a4d1ba8372395a1ab9998963d22df850ad4606b76f4e8d88b5cf",
+        .inputs = mstmm_hinge_gimbal_body_motion_inputs,
+        .outputs = mstmm_hinge_gimbal_body_motion_outputs,
+        .ir_hash = "f19233f77038c2adf451e44efe5d0d999728590bd3ccfc9ac8e29bb80bbf72ea",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -2631,7 +2631,7 @@ static const mstmm_kernel mstmm_hinge_gimbal_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_hinge_gimbal_directions_inputs,
         .outputs = mstmm_hinge_gimbal_directions_outputs,
-        .ir_hash = "23619e529b74a03c80072c4ce6501fbd2c6afc3575de8d75ae1ec2b6dbc539b1",
+        .ir_hash = "eb49dca82ca22f7eafd019623133467b110ef9033185dcb93211eaefbea5bf94",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -2641,7 +2641,7 @@ const mstmm_element mstmm_hinge_gimbal = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "gimbal",
-    .hash = "757f50ca7e34f42b6aeec70262581bd1f28c3445356ff8e995dad4a2fef28f03",
+    .hash = "5b7388a87835692e6f80099f404ad720e1d5cfc68b2c9be230941c4f41dab969",
     .nq = 3,
     .nu = 3,
     .np = 0,

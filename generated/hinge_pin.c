@@ -32,7 +32,7 @@ int mstmm_hinge_pin_rates_by_coordinates(const real *restrict p, const real *res
     const real *restrict u, real *restrict J);
 int mstmm_hinge_pin_rates_by_speeds(const real *restrict p, const real *restrict q,
     const real *restrict u, real *restrict J);
-int mstmm_hinge_pin_forward_kept(const real *restrict p, const real *restrict q,
+int mstmm_hinge_pin_body_motion(const real *restrict p, const real *restrict q,
     const real *restrict u, const real *restrict Rt, const real *restrict ro,
     const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
     real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
@@ -1043,7 +1043,7 @@ static const mstmm_port mstmm_hinge_pin_rates_by_speeds_outputs[] = {
  * out r[3] (m) P of the body from P of the parent, parent axes
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  */
-int mstmm_hinge_pin_forward_kept(const real *restrict p, const real *restrict q,
+int mstmm_hinge_pin_body_motion(const real *restrict p, const real *restrict q,
     const real *restrict u, const real *restrict Rt, const real *restrict ro,
     const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
     real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
@@ -1210,13 +1210,13 @@ int mstmm_hinge_pin_forward_kept(const real *restrict p, const real *restrict q,
     return 0;
 }
 
-static int mstmm_hinge_pin_forward_kept_call(int n, const real *const *in, real *const *out)
+static int mstmm_hinge_pin_body_motion_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_hinge_pin_forward_kept(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]);
+    return mstmm_hinge_pin_body_motion(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]);
 }
 
-static const mstmm_port mstmm_hinge_pin_forward_kept_inputs[] = {
+static const mstmm_port mstmm_hinge_pin_body_motion_inputs[] = {
     {"p", 0, "", 0, 0},
     {"q", 1, "", 0, 0},
     {"u", 1, "", 0, 0},
@@ -1226,7 +1226,7 @@ static const mstmm_port mstmm_hinge_pin_forward_kept_inputs[] = {
     {"motion_I", 9, "", 0, 0},
 };
 
-static const mstmm_port mstmm_hinge_pin_forward_kept_outputs[] = {
+static const mstmm_port mstmm_hinge_pin_body_motion_outputs[] = {
     {"R", 9, "", 0, 0},
     {"d", 3, "m", 0, 0},
     {"H", 6, "", 0, 0},
@@ -1247,7 +1247,7 @@ static const mstmm_port mstmm_hinge_pin_forward_kept_outputs[] = {
  * in  u[1] speeds: angle_rate [rad/s]
  * in  s[1] accelerations of the speeds
  * in  motion[9] w, wd, and a of the body, own axes
- * in  f[6] (N, N*m) load at P that is carried
+ * in  f[6] (N, N*m) carried load at P
  * in  J[1] (kg*m2 or kg) rotor inertia reflected to the speeds
  * in  laws[1][1] change of the laws' efforts, a row a direction
  * in  along[1][1] change of the coordinates, a row a direction
@@ -1255,7 +1255,7 @@ static const mstmm_port mstmm_hinge_pin_forward_kept_outputs[] = {
  * in  scale[1] (1/s) and of its acceleration
  * in  sq[1] (1/s) inverse time by which coordinates follow speeds
  * out B[1][9] motion along the unknowns, a row a direction
- * out G[1][6] change of the load that is carried
+ * out G[1][6] change of the carried load
  * out W[1][1] slopes of the rows by load, rotors and laws
  * out H[6] motion subspace, rows v then w, P axes
  */
@@ -1454,14 +1454,14 @@ static const mstmm_kernel mstmm_hinge_pin_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "forward_kept",
-        .function = (void (*)(void))mstmm_hinge_pin_forward_kept,
-        .call = mstmm_hinge_pin_forward_kept_call,
+        .name = "body_motion",
+        .function = (void (*)(void))mstmm_hinge_pin_body_motion,
+        .call = mstmm_hinge_pin_body_motion_call,
         .n_inputs = 7,
         .n_outputs = 10,
-        .inputs = mstmm_hinge_pin_forward_kept_inputs,
-        .outputs = mstmm_hinge_pin_forward_kept_outputs,
-        .ir_hash = "95fc4b77eb37245abda486faca2987a1db8eb31dc679e8fcf8a97d9eda453e1d",
+        .inputs = mstmm_hinge_pin_body_motion_inputs,
+        .outputs = mstmm_hinge_pin_body_motion_outputs,
+        .ir_hash = "e9376904d70a756b681f13dcbcc0dfe1272e996504142d2855e5658090f1ab70",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1473,7 +1473,7 @@ static const mstmm_kernel mstmm_hinge_pin_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_hinge_pin_directions_inputs,
         .outputs = mstmm_hinge_pin_directions_outputs,
-        .ir_hash = "c5c3d992a414e2dfa0a88c202864631522e9a46f4358340d4666cacb08cd424a",
+        .ir_hash = "b8f83974e03d816f95905bd617612dfaf5f9d56933492a258904d1d1617752c9",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1483,7 +1483,7 @@ const mstmm_element mstmm_hinge_pin = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "pin",
-    .hash = "987bb9b2370bef33965ea37f8e8d1f38e548bee7aba1651390c58950ad39b8db",
+    .hash = "70b10cae83c73c023e9bbc417ef6cb07a1bfb29d70c937c00b01eca3006ba7cc",
     .nq = 1,
     .nu = 1,
     .np = 0,

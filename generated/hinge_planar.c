@@ -31,7 +31,7 @@ int mstmm_hinge_planar_rates_by_coordinates(const real *restrict p, const real *
     const real *restrict u, real *restrict J);
 int mstmm_hinge_planar_rates_by_speeds(const real *restrict p, const real *restrict q,
     const real *restrict u, real *restrict J);
-int mstmm_hinge_planar_forward_kept(const real *restrict p, const real *restrict q,
+int mstmm_hinge_planar_body_motion(const real *restrict p, const real *restrict q,
     const real *restrict u, const real *restrict Rt, const real *restrict ro,
     const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
     real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
@@ -1451,7 +1451,7 @@ static const mstmm_port mstmm_hinge_planar_rates_by_speeds_outputs[] = {
  * out r[3] (m) P of the body from P of the parent, parent axes
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  */
-int mstmm_hinge_planar_forward_kept(const real *restrict p, const real *restrict q,
+int mstmm_hinge_planar_body_motion(const real *restrict p, const real *restrict q,
     const real *restrict u, const real *restrict Rt, const real *restrict ro,
     const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
     real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
@@ -1670,13 +1670,13 @@ int mstmm_hinge_planar_forward_kept(const real *restrict p, const real *restrict
     return 0;
 }
 
-static int mstmm_hinge_planar_forward_kept_call(int n, const real *const *in, real *const *out)
+static int mstmm_hinge_planar_body_motion_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_hinge_planar_forward_kept(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]);
+    return mstmm_hinge_planar_body_motion(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]);
 }
 
-static const mstmm_port mstmm_hinge_planar_forward_kept_inputs[] = {
+static const mstmm_port mstmm_hinge_planar_body_motion_inputs[] = {
     {"p", 0, "", 0, 0},
     {"q", 3, "", 0, 0},
     {"u", 3, "", 0, 0},
@@ -1686,7 +1686,7 @@ static const mstmm_port mstmm_hinge_planar_forward_kept_inputs[] = {
     {"motion_I", 9, "", 0, 0},
 };
 
-static const mstmm_port mstmm_hinge_planar_forward_kept_outputs[] = {
+static const mstmm_port mstmm_hinge_planar_body_motion_outputs[] = {
     {"R", 9, "", 0, 0},
     {"d", 3, "m", 0, 0},
     {"H", 18, "", 0, 0},
@@ -1707,7 +1707,7 @@ static const mstmm_port mstmm_hinge_planar_forward_kept_outputs[] = {
  * in  u[3] speeds: x_rate [m/s], y_rate [m/s], angle_rate [rad/s]
  * in  s[3] accelerations of the speeds
  * in  motion[9] w, wd, and a of the body, own axes
- * in  f[6] (N, N*m) load at P that is carried
+ * in  f[6] (N, N*m) carried load at P
  * in  J[3] (kg*m2 or kg) rotor inertia reflected to the speeds
  * in  laws[3][3] change of the laws' efforts, a row a direction
  * in  along[3][3] change of the coordinates, a row a direction
@@ -1715,7 +1715,7 @@ static const mstmm_port mstmm_hinge_planar_forward_kept_outputs[] = {
  * in  scale[1] (1/s) and of its acceleration
  * in  sq[1] (1/s) inverse time by which coordinates follow speeds
  * out B[3][9] motion along the unknowns, a row a direction
- * out G[3][6] change of the load that is carried
+ * out G[3][6] change of the carried load
  * out W[3][3] slopes of the rows by load, rotors and laws
  * out H[6][3] motion subspace, rows v then w, P axes
  */
@@ -2107,14 +2107,14 @@ static const mstmm_kernel mstmm_hinge_planar_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "forward_kept",
-        .function = (void (*)(void))mstmm_hinge_planar_forward_kept,
-        .call = mstmm_hinge_planar_forward_kept_call,
+        .name = "body_motion",
+        .function = (void (*)(void))mstmm_hinge_planar_body_motion,
+        .call = mstmm_hinge_planar_body_motion_call,
         .n_inputs = 7,
         .n_outputs = 10,
-        .inputs = mstmm_hinge_planar_forward_kept_inputs,
-        .outputs = mstmm_hinge_planar_forward_kept_outputs,
-        .ir_hash = "f7a34e213a32fcce967f794f066d186a6d9fa06a895e8e761ea4ac798f220c83",
+        .inputs = mstmm_hinge_planar_body_motion_inputs,
+        .outputs = mstmm_hinge_planar_body_motion_outputs,
+        .ir_hash = "ca15ef4c7c1c297dcf77ca36169dbeb8cfb86029e37d4cbc3b471b54ebc91d4a",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -2126,7 +2126,7 @@ static const mstmm_kernel mstmm_hinge_planar_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_hinge_planar_directions_inputs,
         .outputs = mstmm_hinge_planar_directions_outputs,
-        .ir_hash = "c03aa6db32a2f329f62fbce732de169953c85e53a01f3b2a263cd2fb562ce39b",
+        .ir_hash = "f9fecd7dfc481767e445474be215b7fc1e1b6809a6cc2b946d26f10adee03faa",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -2136,7 +2136,7 @@ const mstmm_element mstmm_hinge_planar = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "planar",
-    .hash = "0af5e2752fa2d63be7d5f6615f6533c03857b313ff7fe67cdd2c771b0ebbc11c",
+    .hash = "0b8367484cc1eb4f87f0492cd4308dc79494dddcc4887689892f142c0c3b7aa8",
     .nq = 3,
     .nu = 3,
     .np = 0,

@@ -31,7 +31,7 @@ int mstmm_hinge_prismatic_rates_by_coordinates(const real *restrict p, const rea
     const real *restrict u, real *restrict J);
 int mstmm_hinge_prismatic_rates_by_speeds(const real *restrict p, const real *restrict q,
     const real *restrict u, real *restrict J);
-int mstmm_hinge_prismatic_forward_kept(const real *restrict p, const real *restrict q,
+int mstmm_hinge_prismatic_body_motion(const real *restrict p, const real *restrict q,
     const real *restrict u, const real *restrict Rt, const real *restrict ro,
     const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
     real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
@@ -1031,7 +1031,7 @@ static const mstmm_port mstmm_hinge_prismatic_rates_by_speeds_outputs[] = {
  * out r[3] (m) P of the body from P of the parent, parent axes
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  */
-int mstmm_hinge_prismatic_forward_kept(const real *restrict p, const real *restrict q,
+int mstmm_hinge_prismatic_body_motion(const real *restrict p, const real *restrict q,
     const real *restrict u, const real *restrict Rt, const real *restrict ro,
     const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
     real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
@@ -1184,13 +1184,13 @@ int mstmm_hinge_prismatic_forward_kept(const real *restrict p, const real *restr
     return 0;
 }
 
-static int mstmm_hinge_prismatic_forward_kept_call(int n, const real *const *in, real *const *out)
+static int mstmm_hinge_prismatic_body_motion_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_hinge_prismatic_forward_kept(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]);
+    return mstmm_hinge_prismatic_body_motion(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]);
 }
 
-static const mstmm_port mstmm_hinge_prismatic_forward_kept_inputs[] = {
+static const mstmm_port mstmm_hinge_prismatic_body_motion_inputs[] = {
     {"p", 0, "", 0, 0},
     {"q", 1, "", 0, 0},
     {"u", 1, "", 0, 0},
@@ -1200,7 +1200,7 @@ static const mstmm_port mstmm_hinge_prismatic_forward_kept_inputs[] = {
     {"motion_I", 9, "", 0, 0},
 };
 
-static const mstmm_port mstmm_hinge_prismatic_forward_kept_outputs[] = {
+static const mstmm_port mstmm_hinge_prismatic_body_motion_outputs[] = {
     {"R", 9, "", 0, 0},
     {"d", 3, "m", 0, 0},
     {"H", 6, "", 0, 0},
@@ -1221,7 +1221,7 @@ static const mstmm_port mstmm_hinge_prismatic_forward_kept_outputs[] = {
  * in  u[1] speeds: displacement_rate [m/s]
  * in  s[1] accelerations of the speeds
  * in  motion[9] w, wd, and a of the body, own axes
- * in  f[6] (N, N*m) load at P that is carried
+ * in  f[6] (N, N*m) carried load at P
  * in  J[1] (kg*m2 or kg) rotor inertia reflected to the speeds
  * in  laws[1][1] change of the laws' efforts, a row a direction
  * in  along[1][1] change of the coordinates, a row a direction
@@ -1229,7 +1229,7 @@ static const mstmm_port mstmm_hinge_prismatic_forward_kept_outputs[] = {
  * in  scale[1] (1/s) and of its acceleration
  * in  sq[1] (1/s) inverse time by which coordinates follow speeds
  * out B[1][9] motion along the unknowns, a row a direction
- * out G[1][6] change of the load that is carried
+ * out G[1][6] change of the carried load
  * out W[1][1] slopes of the rows by load, rotors and laws
  * out H[6] motion subspace, rows v then w, P axes
  */
@@ -1423,14 +1423,14 @@ static const mstmm_kernel mstmm_hinge_prismatic_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "forward_kept",
-        .function = (void (*)(void))mstmm_hinge_prismatic_forward_kept,
-        .call = mstmm_hinge_prismatic_forward_kept_call,
+        .name = "body_motion",
+        .function = (void (*)(void))mstmm_hinge_prismatic_body_motion,
+        .call = mstmm_hinge_prismatic_body_motion_call,
         .n_inputs = 7,
         .n_outputs = 10,
-        .inputs = mstmm_hinge_prismatic_forward_kept_inputs,
-        .outputs = mstmm_hinge_prismatic_forward_kept_outputs,
-        .ir_hash = "74f6cc26b84d37f5d20cdfeabd0810923716c05cfad9561f03c9733915f50d27",
+        .inputs = mstmm_hinge_prismatic_body_motion_inputs,
+        .outputs = mstmm_hinge_prismatic_body_motion_outputs,
+        .ir_hash = "e2014328c94d52145ab26b35363c83af42c7efbb60f52daba93dd75f05e7fac8",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1442,7 +1442,7 @@ static const mstmm_kernel mstmm_hinge_prismatic_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_hinge_prismatic_directions_inputs,
         .outputs = mstmm_hinge_prismatic_directions_outputs,
-        .ir_hash = "46ae8717dc851c9662a2ae98ba25cb436c8c215ef276f80b418ea1c691f1575c",
+        .ir_hash = "c0326451ff594aa477078b16869266c82a2c4349dd02121b2a093f35bc449c57",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1452,7 +1452,7 @@ const mstmm_element mstmm_hinge_prismatic = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "prismatic",
-    .hash = "090795aa69b6bb57c0764918d46bf35c9daeb2f3a494cb9900ac1e26d02ae25d",
+    .hash = "8d034033ea0037a023fc15a492c8286bf114bc6e3f600da916b59f84f04fec17",
     .nq = 1,
     .nu = 1,
     .np = 0,

@@ -31,7 +31,7 @@ int mstmm_hinge_screw_rates_by_coordinates(const real *restrict p, const real *r
     const real *restrict u, real *restrict J);
 int mstmm_hinge_screw_rates_by_speeds(const real *restrict p, const real *restrict q,
     const real *restrict u, real *restrict J);
-int mstmm_hinge_screw_forward_kept(const real *restrict p, const real *restrict q,
+int mstmm_hinge_screw_body_motion(const real *restrict p, const real *restrict q,
     const real *restrict u, const real *restrict Rt, const real *restrict ro,
     const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
     real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
@@ -1188,7 +1188,7 @@ static const mstmm_port mstmm_hinge_screw_rates_by_speeds_outputs[] = {
  * out r[3] (m) P of the body from P of the parent, parent axes
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  */
-int mstmm_hinge_screw_forward_kept(const real *restrict p, const real *restrict q,
+int mstmm_hinge_screw_body_motion(const real *restrict p, const real *restrict q,
     const real *restrict u, const real *restrict Rt, const real *restrict ro,
     const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
     real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
@@ -1375,13 +1375,13 @@ int mstmm_hinge_screw_forward_kept(const real *restrict p, const real *restrict 
     return 0;
 }
 
-static int mstmm_hinge_screw_forward_kept_call(int n, const real *const *in, real *const *out)
+static int mstmm_hinge_screw_body_motion_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_hinge_screw_forward_kept(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]);
+    return mstmm_hinge_screw_body_motion(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]);
 }
 
-static const mstmm_port mstmm_hinge_screw_forward_kept_inputs[] = {
+static const mstmm_port mstmm_hinge_screw_body_motion_inputs[] = {
     {"p", 1, "", 0, 0},
     {"q", 1, "", 0, 0},
     {"u", 1, "", 0, 0},
@@ -1391,7 +1391,7 @@ static const mstmm_port mstmm_hinge_screw_forward_kept_inputs[] = {
     {"motion_I", 9, "", 0, 0},
 };
 
-static const mstmm_port mstmm_hinge_screw_forward_kept_outputs[] = {
+static const mstmm_port mstmm_hinge_screw_body_motion_outputs[] = {
     {"R", 9, "", 0, 0},
     {"d", 3, "m", 0, 0},
     {"H", 6, "", 0, 0},
@@ -1412,7 +1412,7 @@ static const mstmm_port mstmm_hinge_screw_forward_kept_outputs[] = {
  * in  u[1] speeds: angle_rate [rad/s]
  * in  s[1] accelerations of the speeds
  * in  motion[9] w, wd, and a of the body, own axes
- * in  f[6] (N, N*m) load at P that is carried
+ * in  f[6] (N, N*m) carried load at P
  * in  J[1] (kg*m2 or kg) rotor inertia reflected to the speeds
  * in  laws[1][1] change of the laws' efforts, a row a direction
  * in  along[1][1] change of the coordinates, a row a direction
@@ -1420,7 +1420,7 @@ static const mstmm_port mstmm_hinge_screw_forward_kept_outputs[] = {
  * in  scale[1] (1/s) and of its acceleration
  * in  sq[1] (1/s) inverse time by which coordinates follow speeds
  * out B[1][9] motion along the unknowns, a row a direction
- * out G[1][6] change of the load that is carried
+ * out G[1][6] change of the carried load
  * out W[1][1] slopes of the rows by load, rotors and laws
  * out H[6] motion subspace, rows v then w, P axes
  */
@@ -1670,14 +1670,14 @@ static const mstmm_kernel mstmm_hinge_screw_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "forward_kept",
-        .function = (void (*)(void))mstmm_hinge_screw_forward_kept,
-        .call = mstmm_hinge_screw_forward_kept_call,
+        .name = "body_motion",
+        .function = (void (*)(void))mstmm_hinge_screw_body_motion,
+        .call = mstmm_hinge_screw_body_motion_call,
         .n_inputs = 7,
         .n_outputs = 10,
-        .inputs = mstmm_hinge_screw_forward_kept_inputs,
-        .outputs = mstmm_hinge_screw_forward_kept_outputs,
-        .ir_hash = "ba354826e804cb40bddfc6218e3c57d0f57a7d3041b24bf46cd5c35624deeb5e",
+        .inputs = mstmm_hinge_screw_body_motion_inputs,
+        .outputs = mstmm_hinge_screw_body_motion_outputs,
+        .ir_hash = "a0eada5e3f9034d9acbb4c5bed073737317b30342bdcaf2dabfe3773621396cf",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1689,7 +1689,7 @@ static const mstmm_kernel mstmm_hinge_screw_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_hinge_screw_directions_inputs,
         .outputs = mstmm_hinge_screw_directions_outputs,
-        .ir_hash = "cfbe14c4cfe5c8aea552768f9a8d81896a6a414876766dc1b818d574fbf86680",
+        .ir_hash = "b11edcc28076407580c7c5c2aba8fe8dfa542567e70b046d7a10d748a6c30549",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1699,7 +1699,7 @@ const mstmm_element mstmm_hinge_screw = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "screw",
-    .hash = "7ac692811f30e1fc3f98ef155a0d75a05e63783cb96ba3e52afaf0659a5c7a7c",
+    .hash = "257eae93524446c2a969dcdf0950e431424e25ca6c9d4b101083c6188236a82c",
     .nq = 1,
     .nu = 1,
     .np = 1,

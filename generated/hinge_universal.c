@@ -31,7 +31,7 @@ int mstmm_hinge_universal_rates_by_coordinates(const real *restrict p, const rea
     const real *restrict u, real *restrict J);
 int mstmm_hinge_universal_rates_by_speeds(const real *restrict p, const real *restrict q,
     const real *restrict u, real *restrict J);
-int mstmm_hinge_universal_forward_kept(const real *restrict p, const real *restrict q,
+int mstmm_hinge_universal_body_motion(const real *restrict p, const real *restrict q,
     const real *restrict u, const real *restrict Rt, const real *restrict ro,
     const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
     real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
@@ -1391,7 +1391,7 @@ static const mstmm_port mstmm_hinge_universal_rates_by_speeds_outputs[] = {
  * out r[3] (m) P of the body from P of the parent, parent axes
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  */
-int mstmm_hinge_universal_forward_kept(const real *restrict p, const real *restrict q,
+int mstmm_hinge_universal_body_motion(const real *restrict p, const real *restrict q,
     const real *restrict u, const real *restrict Rt, const real *restrict ro,
     const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
     real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
@@ -1640,13 +1640,13 @@ int mstmm_hinge_universal_forward_kept(const real *restrict p, const real *restr
     return 0;
 }
 
-static int mstmm_hinge_universal_forward_kept_call(int n, const real *const *in, real *const *out)
+static int mstmm_hinge_universal_body_motion_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_hinge_universal_forward_kept(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]);
+    return mstmm_hinge_universal_body_motion(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]);
 }
 
-static const mstmm_port mstmm_hinge_universal_forward_kept_inputs[] = {
+static const mstmm_port mstmm_hinge_universal_body_motion_inputs[] = {
     {"p", 1, "", 0, 0},
     {"q", 2, "", 0, 0},
     {"u", 2, "", 0, 0},
@@ -1656,7 +1656,7 @@ static const mstmm_port mstmm_hinge_universal_forward_kept_inputs[] = {
     {"motion_I", 9, "", 0, 0},
 };
 
-static const mstmm_port mstmm_hinge_universal_forward_kept_outputs[] = {
+static const mstmm_port mstmm_hinge_universal_body_motion_outputs[] = {
     {"R", 9, "", 0, 0},
     {"d", 3, "m", 0, 0},
     {"H", 12, "", 0, 0},
@@ -1677,7 +1677,7 @@ static const mstmm_port mstmm_hinge_universal_forward_kept_outputs[] = {
  * in  u[2] speeds: angle1_rate [rad/s], angle2_rate [rad/s]
  * in  s[2] accelerations of the speeds
  * in  motion[9] w, wd, and a of the body, own axes
- * in  f[6] (N, N*m) load at P that is carried
+ * in  f[6] (N, N*m) carried load at P
  * in  J[2] (kg*m2 or kg) rotor inertia reflected to the speeds
  * in  laws[2][2] change of the laws' efforts, a row a direction
  * in  along[2][2] change of the coordinates, a row a direction
@@ -1685,7 +1685,7 @@ static const mstmm_port mstmm_hinge_universal_forward_kept_outputs[] = {
  * in  scale[1] (1/s) and of its acceleration
  * in  sq[1] (1/s) inverse time by which coordinates follow speeds
  * out B[2][9] motion along the unknowns, a row a direction
- * out G[2][6] change of the load that is carried
+ * out G[2][6] change of the carried load
  * out W[2][2] slopes of the rows by load, rotors and laws
  * out H[6][2] motion subspace, rows v then w, P axes
  */
@@ -2071,14 +2071,14 @@ static const mstmm_kernel mstmm_hinge_universal_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "forward_kept",
-        .function = (void (*)(void))mstmm_hinge_universal_forward_kept,
-        .call = mstmm_hinge_universal_forward_kept_call,
+        .name = "body_motion",
+        .function = (void (*)(void))mstmm_hinge_universal_body_motion,
+        .call = mstmm_hinge_universal_body_motion_call,
         .n_inputs = 7,
         .n_outputs = 10,
-        .inputs = mstmm_hinge_universal_forward_kept_inputs,
-        .outputs = mstmm_hinge_universal_forward_kept_outputs,
-        .ir_hash = "3e93f44ab48b3343170dae915351027e66842c2839eb5f11b100d885db1acab7",
+        .inputs = mstmm_hinge_universal_body_motion_inputs,
+        .outputs = mstmm_hinge_universal_body_motion_outputs,
+        .ir_hash = "7823d7f9f5846a1b5d18d6798de6e4ea0a66a805414ffc891a373010ce599208",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -2090,7 +2090,7 @@ static const mstmm_kernel mstmm_hinge_universal_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_hinge_universal_directions_inputs,
         .outputs = mstmm_hinge_universal_directions_outputs,
-        .ir_hash = "11c726eae5b0f6cda2a2195de125231935facdf6ceb837595f2268a6213ef77f",
+        .ir_hash = "00880e735469b598669163786ea28aaf15d25f1880349fe5d0e147379085d4df",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -2100,7 +2100,7 @@ const mstmm_element mstmm_hinge_universal = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "universal",
-    .hash = "8cd5b2332d879436c91ce8bca8405472770ba1d61a5befc2337e13671212ed67",
+    .hash = "49cd9ecd157e42c9267733ae2533ae7b63f6fd016fcec28623a5511a684d2b37",
     .nq = 2,
     .nu = 2,
     .np = 1,

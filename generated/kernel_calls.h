@@ -56,19 +56,19 @@ static inline int mstmm_frames_point_by(struct mstmm_frames_point to)
 }
 #define mstmm_frames_point(...) mstmm_frames_point_by((struct mstmm_frames_point){__VA_ARGS__})
 
-struct mstmm_frames_turning {
+struct mstmm_frames_angular_motion {
     const real *A;
     const real *motion;
     const real *delta;
     real *w_K;
     real *alpha_K;
 };
-static inline int mstmm_frames_turning_by(struct mstmm_frames_turning to)
+static inline int mstmm_frames_angular_motion_by(struct mstmm_frames_angular_motion to)
 {
-    return mstmm_sweep_frames_turning(
+    return mstmm_sweep_frames_angular_motion(
         to.A, to.motion, to.delta, to.w_K, to.alpha_K);
 }
-#define mstmm_frames_turning(...) mstmm_frames_turning_by((struct mstmm_frames_turning){__VA_ARGS__})
+#define mstmm_frames_angular_motion(...) mstmm_frames_angular_motion_by((struct mstmm_frames_angular_motion){__VA_ARGS__})
 
 struct mstmm_frames_end_frame {
     const real *A;
@@ -97,7 +97,7 @@ static inline int mstmm_frames_applied_load_by(struct mstmm_frames_applied_load 
 }
 #define mstmm_frames_applied_load(...) mstmm_frames_applied_load_by((struct mstmm_frames_applied_load){__VA_ARGS__})
 
-struct mstmm_frames_opposite {
+struct mstmm_frames_reaction_wrench {
     const real *x_F;
     const real *x_T;
     const real *F;
@@ -105,12 +105,12 @@ struct mstmm_frames_opposite {
     real *F_back;
     real *M_back;
 };
-static inline int mstmm_frames_opposite_by(struct mstmm_frames_opposite to)
+static inline int mstmm_frames_reaction_wrench_by(struct mstmm_frames_reaction_wrench to)
 {
-    return mstmm_sweep_frames_opposite(
+    return mstmm_sweep_frames_reaction_wrench(
         to.x_F, to.x_T, to.F, to.M, to.F_back, to.M_back);
 }
-#define mstmm_frames_opposite(...) mstmm_frames_opposite_by((struct mstmm_frames_opposite){__VA_ARGS__})
+#define mstmm_frames_reaction_wrench(...) mstmm_frames_reaction_wrench_by((struct mstmm_frames_reaction_wrench){__VA_ARGS__})
 
 struct mstmm_frames_power {
     const real *A_F;
@@ -198,18 +198,18 @@ static inline int mstmm_frames_reaction_by(struct mstmm_frames_reaction to)
 }
 #define mstmm_frames_reaction(...) mstmm_frames_reaction_by((struct mstmm_frames_reaction){__VA_ARGS__})
 
-struct mstmm_frames_moment_at {
+struct mstmm_frames_moment_about {
     const real *A;
     const real *offset;
     const real *f;
     real *moment;
 };
-static inline int mstmm_frames_moment_at_by(struct mstmm_frames_moment_at to)
+static inline int mstmm_frames_moment_about_by(struct mstmm_frames_moment_about to)
 {
-    return mstmm_sweep_frames_moment_at(
+    return mstmm_sweep_frames_moment_about(
         to.A, to.offset, to.f, to.moment);
 }
-#define mstmm_frames_moment_at(...) mstmm_frames_moment_at_by((struct mstmm_frames_moment_at){__VA_ARGS__})
+#define mstmm_frames_moment_about(...) mstmm_frames_moment_about_by((struct mstmm_frames_moment_about){__VA_ARGS__})
 
 struct mstmm_frames_transport {
     const real *Rc;
@@ -237,7 +237,7 @@ static inline int mstmm_frames_rotor_energy_by(struct mstmm_frames_rotor_energy 
 #define mstmm_frames_rotor_energy(...) mstmm_frames_rotor_energy_by((struct mstmm_frames_rotor_energy){__VA_ARGS__})
 
 struct mstmm_frames_driven_effort {
-    const real *felt;
+    const real *load;
     const real *J;
     const real *udot;
     const real *tau;
@@ -246,7 +246,7 @@ struct mstmm_frames_driven_effort {
 static inline int mstmm_frames_driven_effort_by(struct mstmm_frames_driven_effort to)
 {
     return mstmm_sweep_frames_driven_effort(
-        to.felt, to.J, to.udot, to.tau, to.tau_d);
+        to.load, to.J, to.udot, to.tau, to.tau_d);
 }
 #define mstmm_frames_driven_effort(...) mstmm_frames_driven_effort_by((struct mstmm_frames_driven_effort){__VA_ARGS__})
 
@@ -276,17 +276,17 @@ static inline int mstmm_frames_length_by(struct mstmm_frames_length to)
 }
 #define mstmm_frames_length(...) mstmm_frames_length_by((struct mstmm_frames_length){__VA_ARGS__})
 
-struct mstmm_frames_turned {
+struct mstmm_frames_to_inertial {
     const real *A;
     const real *b;
     real *b_0;
 };
-static inline int mstmm_frames_turned_by(struct mstmm_frames_turned to)
+static inline int mstmm_frames_to_inertial_by(struct mstmm_frames_to_inertial to)
 {
-    return mstmm_sweep_frames_turned(
+    return mstmm_sweep_frames_to_inertial(
         to.A, to.b, to.b_0);
 }
-#define mstmm_frames_turned(...) mstmm_frames_turned_by((struct mstmm_frames_turned){__VA_ARGS__})
+#define mstmm_frames_to_inertial(...) mstmm_frames_to_inertial_by((struct mstmm_frames_to_inertial){__VA_ARGS__})
 
 struct mstmm_frames_classical_body {
     const real *A;
@@ -340,7 +340,7 @@ static inline int mstmm_frames_tangent_carry_by(struct mstmm_frames_tangent_carr
 }
 #define mstmm_frames_tangent_carry(...) mstmm_frames_tangent_carry_by((struct mstmm_frames_tangent_carry){__VA_ARGS__})
 
-struct mstmm_frames_tangent_moved {
+struct mstmm_frames_tangent_motion {
     const real *Rc;
     const real *r;
     const real *w_I;
@@ -349,54 +349,54 @@ struct mstmm_frames_tangent_moved {
     const real *z_I;
     real *z;
 };
-static inline int mstmm_frames_tangent_moved_by(struct mstmm_frames_tangent_moved to)
+static inline int mstmm_frames_tangent_motion_by(struct mstmm_frames_tangent_motion to)
 {
-    return mstmm_sweep_frames_tangent_moved(
+    return mstmm_sweep_frames_tangent_motion(
         to.Rc, to.r, to.w_I, to.v, to.w, to.z_I, to.z);
 }
-#define mstmm_frames_tangent_moved(...) mstmm_frames_tangent_moved_by((struct mstmm_frames_tangent_moved){__VA_ARGS__})
+#define mstmm_frames_tangent_motion(...) mstmm_frames_tangent_motion_by((struct mstmm_frames_tangent_motion){__VA_ARGS__})
 
-struct mstmm_frames_tangent_turned {
+struct mstmm_frames_tangent_pose_change {
     const real *R;
     const real *d_R;
     const real *d_d;
     real *theta;
     real *x;
 };
-static inline int mstmm_frames_tangent_turned_by(struct mstmm_frames_tangent_turned to)
+static inline int mstmm_frames_tangent_pose_change_by(struct mstmm_frames_tangent_pose_change to)
 {
-    return mstmm_sweep_frames_tangent_turned(
+    return mstmm_sweep_frames_tangent_pose_change(
         to.R, to.d_R, to.d_d, to.theta, to.x);
 }
-#define mstmm_frames_tangent_turned(...) mstmm_frames_tangent_turned_by((struct mstmm_frames_tangent_turned){__VA_ARGS__})
+#define mstmm_frames_tangent_pose_change(...) mstmm_frames_tangent_pose_change_by((struct mstmm_frames_tangent_pose_change){__VA_ARGS__})
 
-struct mstmm_frames_tangent_known {
+struct mstmm_frames_tangent_known_load {
     const real *S;
     const real *b;
     const real *g;
     real *e_S;
     real *e_b;
 };
-static inline int mstmm_frames_tangent_known_by(struct mstmm_frames_tangent_known to)
+static inline int mstmm_frames_tangent_known_load_by(struct mstmm_frames_tangent_known_load to)
 {
-    return mstmm_sweep_frames_tangent_known(
+    return mstmm_sweep_frames_tangent_known_load(
         to.S, to.b, to.g, to.e_S, to.e_b);
 }
-#define mstmm_frames_tangent_known(...) mstmm_frames_tangent_known_by((struct mstmm_frames_tangent_known){__VA_ARGS__})
+#define mstmm_frames_tangent_known_load(...) mstmm_frames_tangent_known_load_by((struct mstmm_frames_tangent_known_load){__VA_ARGS__})
 
-struct mstmm_frames_placed_moved {
+struct mstmm_frames_placed_displacement {
     const real *Rc;
     const real *r;
     const real *z_I;
     const real *p_I;
     real *p;
 };
-static inline int mstmm_frames_placed_moved_by(struct mstmm_frames_placed_moved to)
+static inline int mstmm_frames_placed_displacement_by(struct mstmm_frames_placed_displacement to)
 {
-    return mstmm_sweep_frames_placed_moved(
+    return mstmm_sweep_frames_placed_displacement(
         to.Rc, to.r, to.z_I, to.p_I, to.p);
 }
-#define mstmm_frames_placed_moved(...) mstmm_frames_placed_moved_by((struct mstmm_frames_placed_moved){__VA_ARGS__})
+#define mstmm_frames_placed_displacement(...) mstmm_frames_placed_displacement_by((struct mstmm_frames_placed_displacement){__VA_ARGS__})
 
 struct mstmm_frames_placed_pose {
     const real *A;
@@ -444,18 +444,18 @@ static inline int mstmm_frames_placed_carry_by(struct mstmm_frames_placed_carry 
 }
 #define mstmm_frames_placed_carry(...) mstmm_frames_placed_carry_by((struct mstmm_frames_placed_carry){__VA_ARGS__})
 
-struct mstmm_frames_placed_known {
+struct mstmm_frames_placed_known_load {
     const real *S_p;
     const real *b_p;
     real *e_S;
     real *e_b;
 };
-static inline int mstmm_frames_placed_known_by(struct mstmm_frames_placed_known to)
+static inline int mstmm_frames_placed_known_load_by(struct mstmm_frames_placed_known_load to)
 {
-    return mstmm_sweep_frames_placed_known(
+    return mstmm_sweep_frames_placed_known_load(
         to.S_p, to.b_p, to.e_S, to.e_b);
 }
-#define mstmm_frames_placed_known(...) mstmm_frames_placed_known_by((struct mstmm_frames_placed_known){__VA_ARGS__})
+#define mstmm_frames_placed_known_load(...) mstmm_frames_placed_known_load_by((struct mstmm_frames_placed_known_load){__VA_ARGS__})
 
 struct mstmm_frames_pose_slope {
     const real *A_I;
@@ -520,7 +520,7 @@ static inline int mstmm_frames_point_slope_by(struct mstmm_frames_point_slope to
 }
 #define mstmm_frames_point_slope(...) mstmm_frames_point_slope_by((struct mstmm_frames_point_slope){__VA_ARGS__})
 
-struct mstmm_frames_turning_slope {
+struct mstmm_frames_angular_motion_slope {
     const real *A;
     const real *motion;
     const real *delta;
@@ -528,12 +528,12 @@ struct mstmm_frames_turning_slope {
     const real *d_motion;
     real *d_w_K;
 };
-static inline int mstmm_frames_turning_slope_by(struct mstmm_frames_turning_slope to)
+static inline int mstmm_frames_angular_motion_slope_by(struct mstmm_frames_angular_motion_slope to)
 {
-    return mstmm_sweep_frames_turning_slope(
+    return mstmm_sweep_frames_angular_motion_slope(
         to.A, to.motion, to.delta, to.d_A, to.d_motion, to.d_w_K);
 }
-#define mstmm_frames_turning_slope(...) mstmm_frames_turning_slope_by((struct mstmm_frames_turning_slope){__VA_ARGS__})
+#define mstmm_frames_angular_motion_slope(...) mstmm_frames_angular_motion_slope_by((struct mstmm_frames_angular_motion_slope){__VA_ARGS__})
 
 struct mstmm_frames_end_frame_slope {
     const real *A;
@@ -567,7 +567,7 @@ static inline int mstmm_frames_applied_load_slope_by(struct mstmm_frames_applied
 }
 #define mstmm_frames_applied_load_slope(...) mstmm_frames_applied_load_slope_by((struct mstmm_frames_applied_load_slope){__VA_ARGS__})
 
-struct mstmm_frames_opposite_slope {
+struct mstmm_frames_reaction_wrench_slope {
     const real *x_F;
     const real *x_T;
     const real *F;
@@ -579,12 +579,12 @@ struct mstmm_frames_opposite_slope {
     real *d_F_back;
     real *d_M_back;
 };
-static inline int mstmm_frames_opposite_slope_by(struct mstmm_frames_opposite_slope to)
+static inline int mstmm_frames_reaction_wrench_slope_by(struct mstmm_frames_reaction_wrench_slope to)
 {
-    return mstmm_sweep_frames_opposite_slope(
+    return mstmm_sweep_frames_reaction_wrench_slope(
         to.x_F, to.x_T, to.F, to.M, to.d_x_F, to.d_x_T, to.d_F, to.d_M, to.d_F_back, to.d_M_back);
 }
-#define mstmm_frames_opposite_slope(...) mstmm_frames_opposite_slope_by((struct mstmm_frames_opposite_slope){__VA_ARGS__})
+#define mstmm_frames_reaction_wrench_slope(...) mstmm_frames_reaction_wrench_slope_by((struct mstmm_frames_reaction_wrench_slope){__VA_ARGS__})
 
 struct mstmm_frames_transport_slope {
     const real *Rc;
@@ -603,11 +603,11 @@ static inline int mstmm_frames_transport_slope_by(struct mstmm_frames_transport_
 #define mstmm_frames_transport_slope(...) mstmm_frames_transport_slope_by((struct mstmm_frames_transport_slope){__VA_ARGS__})
 
 struct mstmm_frames_driven_effort_slope {
-    const real *felt;
+    const real *load;
     const real *J;
     const real *udot;
     const real *tau;
-    const real *d_felt;
+    const real *d_load;
     const real *d_udot;
     const real *d_tau;
     real *d_tau_d;
@@ -615,7 +615,7 @@ struct mstmm_frames_driven_effort_slope {
 static inline int mstmm_frames_driven_effort_slope_by(struct mstmm_frames_driven_effort_slope to)
 {
     return mstmm_sweep_frames_driven_effort_slope(
-        to.felt, to.J, to.udot, to.tau, to.d_felt, to.d_udot, to.d_tau, to.d_tau_d);
+        to.load, to.J, to.udot, to.tau, to.d_load, to.d_udot, to.d_tau, to.d_tau_d);
 }
 #define mstmm_frames_driven_effort_slope(...) mstmm_frames_driven_effort_slope_by((struct mstmm_frames_driven_effort_slope){__VA_ARGS__})
 
@@ -761,7 +761,7 @@ static inline int mstmm_modal_section_by(struct mstmm_modal_section to)
 }
 #define mstmm_modal_section(...) mstmm_modal_section_by((struct mstmm_modal_section){__VA_ARGS__})
 
-struct mstmm_modal_outward {
+struct mstmm_modal_end_motion {
     const real *R_end;
     const real *x;
     const real *Psi;
@@ -776,15 +776,15 @@ struct mstmm_modal_outward {
     real *w;
     real *c;
 };
-static inline int mstmm_modal_outward_by(struct mstmm_modal_outward to)
+static inline int mstmm_modal_end_motion_by(struct mstmm_modal_end_motion to)
 {
-    return mstmm_sweep_modal_outward(
+    return mstmm_sweep_modal_end_motion(
         to.R_end, to.x, to.Psi, to.xd, to.Psid, to.xdd, to.Psidd, to.R, to.d, to.H6, to.v, to.w,
         to.c);
 }
-#define mstmm_modal_outward(...) mstmm_modal_outward_by((struct mstmm_modal_outward){__VA_ARGS__})
+#define mstmm_modal_end_motion(...) mstmm_modal_end_motion_by((struct mstmm_modal_end_motion){__VA_ARGS__})
 
-struct mstmm_modal_inward {
+struct mstmm_modal_frame_motion {
     const real *R_end;
     const real *x;
     const real *Psi;
@@ -799,13 +799,13 @@ struct mstmm_modal_inward {
     real *w;
     real *c;
 };
-static inline int mstmm_modal_inward_by(struct mstmm_modal_inward to)
+static inline int mstmm_modal_frame_motion_by(struct mstmm_modal_frame_motion to)
 {
-    return mstmm_sweep_modal_inward(
+    return mstmm_sweep_modal_frame_motion(
         to.R_end, to.x, to.Psi, to.xd, to.Psid, to.xdd, to.Psidd, to.R, to.d, to.H6, to.v, to.w,
         to.c);
 }
-#define mstmm_modal_inward(...) mstmm_modal_inward_by((struct mstmm_modal_inward){__VA_ARGS__})
+#define mstmm_modal_frame_motion(...) mstmm_modal_frame_motion_by((struct mstmm_modal_frame_motion){__VA_ARGS__})
 
 struct mstmm_modal_subspace {
     int n;
@@ -820,21 +820,21 @@ static inline int mstmm_modal_subspace_by(struct mstmm_modal_subspace to)
 }
 #define mstmm_modal_subspace(...) mstmm_modal_subspace_by((struct mstmm_modal_subspace){__VA_ARGS__})
 
-struct mstmm_modal_imposed {
+struct mstmm_modal_prescribed_bias {
     int n;
     const real *H;
     const real *s;
     const real *c;
     real *c_s;
 };
-static inline int mstmm_modal_imposed_by(struct mstmm_modal_imposed to)
+static inline int mstmm_modal_prescribed_bias_by(struct mstmm_modal_prescribed_bias to)
 {
-    return mstmm_sweep_modal_imposed(
+    return mstmm_sweep_modal_prescribed_bias(
         to.n, to.H, to.s, to.c, to.c_s);
 }
-#define mstmm_modal_imposed(...) mstmm_modal_imposed_by((struct mstmm_modal_imposed){__VA_ARGS__})
+#define mstmm_modal_prescribed_bias(...) mstmm_modal_prescribed_bias_by((struct mstmm_modal_prescribed_bias){__VA_ARGS__})
 
-struct mstmm_modal_absorb {
+struct mstmm_modal_assemble_port {
     int n;
     const real *Rc;
     const real *r;
@@ -846,12 +846,12 @@ struct mstmm_modal_absorb {
     real *S_ff;
     real *e_f;
 };
-static inline int mstmm_modal_absorb_by(struct mstmm_modal_absorb to)
+static inline int mstmm_modal_assemble_port_by(struct mstmm_modal_assemble_port to)
 {
-    return mstmm_sweep_modal_absorb(
+    return mstmm_sweep_modal_assemble_port(
         to.n, to.Rc, to.r, to.H, to.S, to.e, to.U, to.S_rf, to.S_ff, to.e_f);
 }
-#define mstmm_modal_absorb(...) mstmm_modal_absorb_by((struct mstmm_modal_absorb){__VA_ARGS__})
+#define mstmm_modal_assemble_port(...) mstmm_modal_assemble_port_by((struct mstmm_modal_assemble_port){__VA_ARGS__})
 
 struct mstmm_modal_rebase {
     int n;
@@ -903,21 +903,21 @@ static inline int mstmm_modal_recover_by(struct mstmm_modal_recover to)
 }
 #define mstmm_modal_recover(...) mstmm_modal_recover_by((struct mstmm_modal_recover){__VA_ARGS__})
 
-struct mstmm_modal_displaced {
+struct mstmm_modal_port_deviation {
     int n;
     const real *H;
     const real *etadd;
     const real *delta_I;
     real *delta;
 };
-static inline int mstmm_modal_displaced_by(struct mstmm_modal_displaced to)
+static inline int mstmm_modal_port_deviation_by(struct mstmm_modal_port_deviation to)
 {
-    return mstmm_sweep_modal_displaced(
+    return mstmm_sweep_modal_port_deviation(
         to.n, to.H, to.etadd, to.delta_I, to.delta);
 }
-#define mstmm_modal_displaced(...) mstmm_modal_displaced_by((struct mstmm_modal_displaced){__VA_ARGS__})
+#define mstmm_modal_port_deviation(...) mstmm_modal_port_deviation_by((struct mstmm_modal_port_deviation){__VA_ARGS__})
 
-struct mstmm_modal_prescribed {
+struct mstmm_modal_prescribed_load {
     int n;
     const real *S_rf;
     const real *S_ff;
@@ -925,12 +925,12 @@ struct mstmm_modal_prescribed {
     real *e;
     real *e_f;
 };
-static inline int mstmm_modal_prescribed_by(struct mstmm_modal_prescribed to)
+static inline int mstmm_modal_prescribed_load_by(struct mstmm_modal_prescribed_load to)
 {
-    return mstmm_sweep_modal_prescribed(
+    return mstmm_sweep_modal_prescribed_load(
         to.n, to.S_rf, to.S_ff, to.s, to.e, to.e_f);
 }
-#define mstmm_modal_prescribed(...) mstmm_modal_prescribed_by((struct mstmm_modal_prescribed){__VA_ARGS__})
+#define mstmm_modal_prescribed_load(...) mstmm_modal_prescribed_load_by((struct mstmm_modal_prescribed_load){__VA_ARGS__})
 
 struct mstmm_modal_modal_effort {
     int n;
@@ -946,21 +946,21 @@ static inline int mstmm_modal_modal_effort_by(struct mstmm_modal_modal_effort to
 }
 #define mstmm_modal_modal_effort(...) mstmm_modal_modal_effort_by((struct mstmm_modal_modal_effort){__VA_ARGS__})
 
-struct mstmm_modal_pushed {
+struct mstmm_modal_column_load {
     int n;
     const real *Gg;
     const real *e;
     const real *e_f;
     real *e_c;
 };
-static inline int mstmm_modal_pushed_by(struct mstmm_modal_pushed to)
+static inline int mstmm_modal_column_load_by(struct mstmm_modal_column_load to)
 {
-    return mstmm_sweep_modal_pushed(
+    return mstmm_sweep_modal_column_load(
         to.n, to.Gg, to.e, to.e_f, to.e_c);
 }
-#define mstmm_modal_pushed(...) mstmm_modal_pushed_by((struct mstmm_modal_pushed){__VA_ARGS__})
+#define mstmm_modal_column_load(...) mstmm_modal_column_load_by((struct mstmm_modal_column_load){__VA_ARGS__})
 
-struct mstmm_modal_answer {
+struct mstmm_modal_column_acceleration {
     int n;
     const real *S_ff;
     const real *e_f;
@@ -970,14 +970,14 @@ struct mstmm_modal_answer {
     real *etadd;
     real *work;
 };
-static inline int mstmm_modal_answer_by(struct mstmm_modal_answer to)
+static inline int mstmm_modal_column_acceleration_by(struct mstmm_modal_column_acceleration to)
 {
-    return mstmm_sweep_modal_answer(
+    return mstmm_sweep_modal_column_acceleration(
         to.n, to.S_ff, to.e_f, to.Gg, to.delta_I, to.y, to.etadd, to.work);
 }
-#define mstmm_modal_answer(...) mstmm_modal_answer_by((struct mstmm_modal_answer){__VA_ARGS__})
+#define mstmm_modal_column_acceleration(...) mstmm_modal_column_acceleration_by((struct mstmm_modal_column_acceleration){__VA_ARGS__})
 
-struct mstmm_modal_stiffened {
+struct mstmm_modal_step_stiffness {
     int n;
     const real *K;
     const real *D;
@@ -985,14 +985,14 @@ struct mstmm_modal_stiffened {
     const real *sq;
     real *S_ff;
 };
-static inline int mstmm_modal_stiffened_by(struct mstmm_modal_stiffened to)
+static inline int mstmm_modal_step_stiffness_by(struct mstmm_modal_step_stiffness to)
 {
-    return mstmm_sweep_modal_stiffened(
+    return mstmm_sweep_modal_step_stiffness(
         to.n, to.K, to.D, to.rate, to.sq, to.S_ff);
 }
-#define mstmm_modal_stiffened(...) mstmm_modal_stiffened_by((struct mstmm_modal_stiffened){__VA_ARGS__})
+#define mstmm_modal_step_stiffness(...) mstmm_modal_step_stiffness_by((struct mstmm_modal_step_stiffness){__VA_ARGS__})
 
-struct mstmm_modal_strained {
+struct mstmm_modal_strain_load {
     int n;
     const real *K;
     const real *D;
@@ -1000,27 +1000,27 @@ struct mstmm_modal_strained {
     const real *etad;
     real *e_f;
 };
-static inline int mstmm_modal_strained_by(struct mstmm_modal_strained to)
+static inline int mstmm_modal_strain_load_by(struct mstmm_modal_strain_load to)
 {
-    return mstmm_sweep_modal_strained(
+    return mstmm_sweep_modal_strain_load(
         to.n, to.K, to.D, to.eta, to.etad, to.e_f);
 }
-#define mstmm_modal_strained(...) mstmm_modal_strained_by((struct mstmm_modal_strained){__VA_ARGS__})
+#define mstmm_modal_strain_load(...) mstmm_modal_strain_load_by((struct mstmm_modal_strain_load){__VA_ARGS__})
 
-struct mstmm_modal_row_felt {
+struct mstmm_modal_modal_column {
     int n;
     const real *H;
     const real *K;
     real *K_f;
 };
-static inline int mstmm_modal_row_felt_by(struct mstmm_modal_row_felt to)
+static inline int mstmm_modal_modal_column_by(struct mstmm_modal_modal_column to)
 {
-    return mstmm_sweep_modal_row_felt(
+    return mstmm_sweep_modal_modal_column(
         to.n, to.H, to.K, to.K_f);
 }
-#define mstmm_modal_row_felt(...) mstmm_modal_row_felt_by((struct mstmm_modal_row_felt){__VA_ARGS__})
+#define mstmm_modal_modal_column(...) mstmm_modal_modal_column_by((struct mstmm_modal_modal_column){__VA_ARGS__})
 
-struct mstmm_modal_row_condensed {
+struct mstmm_modal_condense_row {
     int n;
     const real *S_ff;
     const real *K_f;
@@ -1030,38 +1030,38 @@ struct mstmm_modal_row_condensed {
     real *l_;
     real *work;
 };
-static inline int mstmm_modal_row_condensed_by(struct mstmm_modal_row_condensed to)
+static inline int mstmm_modal_condense_row_by(struct mstmm_modal_condense_row to)
 {
-    return mstmm_sweep_modal_row_condensed(
+    return mstmm_sweep_modal_condense_row(
         to.n, to.S_ff, to.K_f, to.Gg, to.Y, to.K, to.l_, to.work);
 }
-#define mstmm_modal_row_condensed(...) mstmm_modal_row_condensed_by((struct mstmm_modal_row_condensed){__VA_ARGS__})
+#define mstmm_modal_condense_row(...) mstmm_modal_condense_row_by((struct mstmm_modal_condense_row){__VA_ARGS__})
 
-struct mstmm_modal_row_coupled {
+struct mstmm_modal_row_coupling {
     int n;
     const real *K_f;
     const real *Y;
     real *L_ij;
 };
-static inline int mstmm_modal_row_coupled_by(struct mstmm_modal_row_coupled to)
+static inline int mstmm_modal_row_coupling_by(struct mstmm_modal_row_coupling to)
 {
-    return mstmm_sweep_modal_row_coupled(
+    return mstmm_sweep_modal_row_coupling(
         to.n, to.K_f, to.Y, to.L_ij);
 }
-#define mstmm_modal_row_coupled(...) mstmm_modal_row_coupled_by((struct mstmm_modal_row_coupled){__VA_ARGS__})
+#define mstmm_modal_row_coupling(...) mstmm_modal_row_coupling_by((struct mstmm_modal_row_coupling){__VA_ARGS__})
 
-struct mstmm_modal_row_answered {
+struct mstmm_modal_multiplier_acceleration {
     int n;
     const real *Y;
     const real *x;
     real *etadd;
 };
-static inline int mstmm_modal_row_answered_by(struct mstmm_modal_row_answered to)
+static inline int mstmm_modal_multiplier_acceleration_by(struct mstmm_modal_multiplier_acceleration to)
 {
-    return mstmm_sweep_modal_row_answered(
+    return mstmm_sweep_modal_multiplier_acceleration(
         to.n, to.Y, to.x, to.etadd);
 }
-#define mstmm_modal_row_answered(...) mstmm_modal_row_answered_by((struct mstmm_modal_row_answered){__VA_ARGS__})
+#define mstmm_modal_multiplier_acceleration(...) mstmm_modal_multiplier_acceleration_by((struct mstmm_modal_multiplier_acceleration){__VA_ARGS__})
 
 struct mstmm_modal_residual_slope {
     int n;
@@ -1185,7 +1185,7 @@ static inline int mstmm_modal_section_slope_by(struct mstmm_modal_section_slope 
 }
 #define mstmm_modal_section_slope(...) mstmm_modal_section_slope_by((struct mstmm_modal_section_slope){__VA_ARGS__})
 
-struct mstmm_modal_outward_slope {
+struct mstmm_modal_end_motion_slope {
     const real *R_end;
     const real *x;
     const real *Psi;
@@ -1206,15 +1206,15 @@ struct mstmm_modal_outward_slope {
     real *d_w;
     real *d_c;
 };
-static inline int mstmm_modal_outward_slope_by(struct mstmm_modal_outward_slope to)
+static inline int mstmm_modal_end_motion_slope_by(struct mstmm_modal_end_motion_slope to)
 {
-    return mstmm_sweep_modal_outward_slope(
+    return mstmm_sweep_modal_end_motion_slope(
         to.R_end, to.x, to.Psi, to.xd, to.Psid, to.xdd, to.Psidd, to.d_x, to.d_Psi, to.d_xd,
         to.d_Psid, to.d_xdd, to.d_Psidd, to.d_R, to.d_d, to.d_H6, to.d_v, to.d_w, to.d_c);
 }
-#define mstmm_modal_outward_slope(...) mstmm_modal_outward_slope_by((struct mstmm_modal_outward_slope){__VA_ARGS__})
+#define mstmm_modal_end_motion_slope(...) mstmm_modal_end_motion_slope_by((struct mstmm_modal_end_motion_slope){__VA_ARGS__})
 
-struct mstmm_modal_inward_slope {
+struct mstmm_modal_frame_motion_slope {
     const real *R_end;
     const real *x;
     const real *Psi;
@@ -1235,13 +1235,13 @@ struct mstmm_modal_inward_slope {
     real *d_w;
     real *d_c;
 };
-static inline int mstmm_modal_inward_slope_by(struct mstmm_modal_inward_slope to)
+static inline int mstmm_modal_frame_motion_slope_by(struct mstmm_modal_frame_motion_slope to)
 {
-    return mstmm_sweep_modal_inward_slope(
+    return mstmm_sweep_modal_frame_motion_slope(
         to.R_end, to.x, to.Psi, to.xd, to.Psid, to.xdd, to.Psidd, to.d_x, to.d_Psi, to.d_xd,
         to.d_Psid, to.d_xdd, to.d_Psidd, to.d_R, to.d_d, to.d_H6, to.d_v, to.d_w, to.d_c);
 }
-#define mstmm_modal_inward_slope(...) mstmm_modal_inward_slope_by((struct mstmm_modal_inward_slope){__VA_ARGS__})
+#define mstmm_modal_frame_motion_slope(...) mstmm_modal_frame_motion_slope_by((struct mstmm_modal_frame_motion_slope){__VA_ARGS__})
 
 struct mstmm_modal_subspace_slope {
     int n;
@@ -1258,7 +1258,7 @@ static inline int mstmm_modal_subspace_slope_by(struct mstmm_modal_subspace_slop
 }
 #define mstmm_modal_subspace_slope(...) mstmm_modal_subspace_slope_by((struct mstmm_modal_subspace_slope){__VA_ARGS__})
 
-struct mstmm_modal_imposed_slope {
+struct mstmm_modal_prescribed_bias_slope {
     int n;
     const real *H;
     const real *s;
@@ -1268,14 +1268,14 @@ struct mstmm_modal_imposed_slope {
     const real *d_c;
     real *d_c_s;
 };
-static inline int mstmm_modal_imposed_slope_by(struct mstmm_modal_imposed_slope to)
+static inline int mstmm_modal_prescribed_bias_slope_by(struct mstmm_modal_prescribed_bias_slope to)
 {
-    return mstmm_sweep_modal_imposed_slope(
+    return mstmm_sweep_modal_prescribed_bias_slope(
         to.n, to.H, to.s, to.c, to.d_H, to.d_s, to.d_c, to.d_c_s);
 }
-#define mstmm_modal_imposed_slope(...) mstmm_modal_imposed_slope_by((struct mstmm_modal_imposed_slope){__VA_ARGS__})
+#define mstmm_modal_prescribed_bias_slope(...) mstmm_modal_prescribed_bias_slope_by((struct mstmm_modal_prescribed_bias_slope){__VA_ARGS__})
 
-struct mstmm_modal_prescribed_slope {
+struct mstmm_modal_prescribed_load_slope {
     int n;
     const real *S_rf;
     const real *S_ff;
@@ -1285,12 +1285,12 @@ struct mstmm_modal_prescribed_slope {
     real *d_e;
     real *d_e_f;
 };
-static inline int mstmm_modal_prescribed_slope_by(struct mstmm_modal_prescribed_slope to)
+static inline int mstmm_modal_prescribed_load_slope_by(struct mstmm_modal_prescribed_load_slope to)
 {
-    return mstmm_sweep_modal_prescribed_slope(
+    return mstmm_sweep_modal_prescribed_load_slope(
         to.n, to.S_rf, to.S_ff, to.s, to.d_S_rf, to.d_s, to.d_e, to.d_e_f);
 }
-#define mstmm_modal_prescribed_slope(...) mstmm_modal_prescribed_slope_by((struct mstmm_modal_prescribed_slope){__VA_ARGS__})
+#define mstmm_modal_prescribed_load_slope(...) mstmm_modal_prescribed_load_slope_by((struct mstmm_modal_prescribed_load_slope){__VA_ARGS__})
 
 struct mstmm_modal_modal_effort_slope {
     int n;
@@ -1348,7 +1348,7 @@ static inline int mstmm_tangent_node_by(struct mstmm_tangent_node to)
 }
 #define mstmm_tangent_node(...) mstmm_tangent_node_by((struct mstmm_tangent_node){__VA_ARGS__})
 
-struct mstmm_tangent_absorb {
+struct mstmm_tangent_assemble_port {
     int n;
     const real *Rc;
     const real *r;
@@ -1363,14 +1363,14 @@ struct mstmm_tangent_absorb {
     real *Z_z;
     real *Z_x;
 };
-static inline int mstmm_tangent_absorb_by(struct mstmm_tangent_absorb to)
+static inline int mstmm_tangent_assemble_port_by(struct mstmm_tangent_assemble_port to)
 {
-    return mstmm_sweep_tangent_absorb(
+    return mstmm_sweep_tangent_assemble_port(
         to.n, to.Rc, to.r, to.H, to.B, to.G, to.W, to.S, to.T, to.K_x, to.K, to.Z_z, to.Z_x);
 }
-#define mstmm_tangent_absorb(...) mstmm_tangent_absorb_by((struct mstmm_tangent_absorb){__VA_ARGS__})
+#define mstmm_tangent_assemble_port(...) mstmm_tangent_assemble_port_by((struct mstmm_tangent_assemble_port){__VA_ARGS__})
 
-struct mstmm_tangent_push {
+struct mstmm_tangent_column_load {
     int n;
     const real *H;
     const real *V;
@@ -1382,14 +1382,14 @@ struct mstmm_tangent_push {
     real *e_c;
     real *work;
 };
-static inline int mstmm_tangent_push_by(struct mstmm_tangent_push to)
+static inline int mstmm_tangent_column_load_by(struct mstmm_tangent_column_load to)
 {
-    return mstmm_sweep_tangent_push(
+    return mstmm_sweep_tangent_column_load(
         to.n, to.H, to.V, to.D, to.e, to.e_f, to.rest, to.y, to.e_c, to.work);
 }
-#define mstmm_tangent_push(...) mstmm_tangent_push_by((struct mstmm_tangent_push){__VA_ARGS__})
+#define mstmm_tangent_column_load(...) mstmm_tangent_column_load_by((struct mstmm_tangent_column_load){__VA_ARGS__})
 
-struct mstmm_tangent_answer {
+struct mstmm_tangent_column_solution {
     int n;
     const real *B;
     const real *gain;
@@ -1398,28 +1398,28 @@ struct mstmm_tangent_answer {
     real *x;
     real *z;
 };
-static inline int mstmm_tangent_answer_by(struct mstmm_tangent_answer to)
+static inline int mstmm_tangent_column_solution_by(struct mstmm_tangent_column_solution to)
 {
-    return mstmm_sweep_tangent_answer(
+    return mstmm_sweep_tangent_column_solution(
         to.n, to.B, to.gain, to.y, to.z_c, to.x, to.z);
 }
-#define mstmm_tangent_answer(...) mstmm_tangent_answer_by((struct mstmm_tangent_answer){__VA_ARGS__})
+#define mstmm_tangent_column_solution(...) mstmm_tangent_column_solution_by((struct mstmm_tangent_column_solution){__VA_ARGS__})
 
-struct mstmm_tangent_displaced {
+struct mstmm_tangent_port_motion {
     int n;
     const real *B;
     const real *x;
     const real *z_c;
     real *z;
 };
-static inline int mstmm_tangent_displaced_by(struct mstmm_tangent_displaced to)
+static inline int mstmm_tangent_port_motion_by(struct mstmm_tangent_port_motion to)
 {
-    return mstmm_sweep_tangent_displaced(
+    return mstmm_sweep_tangent_port_motion(
         to.n, to.B, to.x, to.z_c, to.z);
 }
-#define mstmm_tangent_displaced(...) mstmm_tangent_displaced_by((struct mstmm_tangent_displaced){__VA_ARGS__})
+#define mstmm_tangent_port_motion(...) mstmm_tangent_port_motion_by((struct mstmm_tangent_port_motion){__VA_ARGS__})
 
-struct mstmm_tangent_lag {
+struct mstmm_tangent_increment_matrix {
     int n;
     const real *sq;
     const real *kappa;
@@ -1429,25 +1429,25 @@ struct mstmm_tangent_lag {
     real *Q;
     real *work;
 };
-static inline int mstmm_tangent_lag_by(struct mstmm_tangent_lag to)
+static inline int mstmm_tangent_increment_matrix_by(struct mstmm_tangent_increment_matrix to)
 {
-    return mstmm_sweep_tangent_lag(
+    return mstmm_sweep_tangent_increment_matrix(
         to.n, to.sq, to.kappa, to.one, to.g_q, to.A, to.Q, to.work);
 }
-#define mstmm_tangent_lag(...) mstmm_tangent_lag_by((struct mstmm_tangent_lag){__VA_ARGS__})
+#define mstmm_tangent_increment_matrix(...) mstmm_tangent_increment_matrix_by((struct mstmm_tangent_increment_matrix){__VA_ARGS__})
 
-struct mstmm_tangent_lagged {
+struct mstmm_tangent_coordinate_increment {
     int n;
     const real *Q;
     const real *rate;
     real *dq;
 };
-static inline int mstmm_tangent_lagged_by(struct mstmm_tangent_lagged to)
+static inline int mstmm_tangent_coordinate_increment_by(struct mstmm_tangent_coordinate_increment to)
 {
-    return mstmm_sweep_tangent_lagged(
+    return mstmm_sweep_tangent_coordinate_increment(
         to.n, to.Q, to.rate, to.dq);
 }
-#define mstmm_tangent_lagged(...) mstmm_tangent_lagged_by((struct mstmm_tangent_lagged){__VA_ARGS__})
+#define mstmm_tangent_coordinate_increment(...) mstmm_tangent_coordinate_increment_by((struct mstmm_tangent_coordinate_increment){__VA_ARGS__})
 
 struct mstmm_tangent_placed_rows {
     int n;
@@ -1511,7 +1511,7 @@ static inline int mstmm_tangent_placed_node_by(struct mstmm_tangent_placed_node 
 }
 #define mstmm_tangent_placed_node(...) mstmm_tangent_placed_node_by((struct mstmm_tangent_placed_node){__VA_ARGS__})
 
-struct mstmm_tangent_placed_absorb {
+struct mstmm_tangent_placed_port {
     int n;
     const real *Rc;
     const real *r;
@@ -1523,25 +1523,25 @@ struct mstmm_tangent_placed_absorb {
     real *Z_p;
     real *Z_x;
 };
-static inline int mstmm_tangent_placed_absorb_by(struct mstmm_tangent_placed_absorb to)
+static inline int mstmm_tangent_placed_port_by(struct mstmm_tangent_placed_port to)
 {
-    return mstmm_sweep_tangent_placed_absorb(
+    return mstmm_sweep_tangent_placed_port(
         to.n, to.Rc, to.r, to.H, to.B_p, to.S_p, to.T_p, to.K, to.Z_p, to.Z_x);
 }
-#define mstmm_tangent_placed_absorb(...) mstmm_tangent_placed_absorb_by((struct mstmm_tangent_placed_absorb){__VA_ARGS__})
+#define mstmm_tangent_placed_port(...) mstmm_tangent_placed_port_by((struct mstmm_tangent_placed_port){__VA_ARGS__})
 
-struct mstmm_tangent_placed_left {
+struct mstmm_tangent_placed_remainder {
     int n;
     const real *gain;
     const real *p;
     real *y;
 };
-static inline int mstmm_tangent_placed_left_by(struct mstmm_tangent_placed_left to)
+static inline int mstmm_tangent_placed_remainder_by(struct mstmm_tangent_placed_remainder to)
 {
-    return mstmm_sweep_tangent_placed_left(
+    return mstmm_sweep_tangent_placed_remainder(
         to.n, to.gain, to.p, to.y);
 }
-#define mstmm_tangent_placed_left(...) mstmm_tangent_placed_left_by((struct mstmm_tangent_placed_left){__VA_ARGS__})
+#define mstmm_tangent_placed_remainder(...) mstmm_tangent_placed_remainder_by((struct mstmm_tangent_placed_remainder){__VA_ARGS__})
 
 struct mstmm_qr_factor {
     const real *S;
@@ -1586,21 +1586,21 @@ static inline int mstmm_qr_merge_by(struct mstmm_qr_merge to)
 }
 #define mstmm_qr_merge(...) mstmm_qr_merge_by((struct mstmm_qr_merge){__VA_ARGS__})
 
-struct mstmm_qr_restored {
+struct mstmm_qr_rows_to_riccati {
     const real *U;
     const real *d;
     const real *e;
     real *S;
     real *e_S;
 };
-static inline int mstmm_qr_restored_by(struct mstmm_qr_restored to)
+static inline int mstmm_qr_rows_to_riccati_by(struct mstmm_qr_rows_to_riccati to)
 {
-    return mstmm_sweep_qr_restored(
+    return mstmm_sweep_qr_rows_to_riccati(
         to.U, to.d, to.e, to.S, to.e_S);
 }
-#define mstmm_qr_restored(...) mstmm_qr_restored_by((struct mstmm_qr_restored){__VA_ARGS__})
+#define mstmm_qr_rows_to_riccati(...) mstmm_qr_rows_to_riccati_by((struct mstmm_qr_rows_to_riccati){__VA_ARGS__})
 
-struct mstmm_loops_meet {
+struct mstmm_loops_relative_pose {
     const real *A_C;
     const real *x_C;
     const real *A_B;
@@ -1612,12 +1612,12 @@ struct mstmm_loops_meet {
     real *r_A;
     real *d;
 };
-static inline int mstmm_loops_meet_by(struct mstmm_loops_meet to)
+static inline int mstmm_loops_relative_pose_by(struct mstmm_loops_relative_pose to)
 {
-    return mstmm_sweep_loops_meet(
+    return mstmm_sweep_loops_relative_pose(
         to.A_C, to.x_C, to.A_B, to.x_B, to.r_e, to.Rc, to.r, to.R_C, to.r_A, to.d);
 }
-#define mstmm_loops_meet(...) mstmm_loops_meet_by((struct mstmm_loops_meet){__VA_ARGS__})
+#define mstmm_loops_relative_pose(...) mstmm_loops_relative_pose_by((struct mstmm_loops_relative_pose){__VA_ARGS__})
 
 struct mstmm_loops_gap {
     const real *R_e;
@@ -1665,17 +1665,17 @@ static inline int mstmm_loops_drift_by(struct mstmm_loops_drift to)
 }
 #define mstmm_loops_drift(...) mstmm_loops_drift_by((struct mstmm_loops_drift){__VA_ARGS__})
 
-struct mstmm_loops_closing {
+struct mstmm_loops_required_acceleration {
     const real *gap;
     const real *rate;
     real *relative;
 };
-static inline int mstmm_loops_closing_by(struct mstmm_loops_closing to)
+static inline int mstmm_loops_required_acceleration_by(struct mstmm_loops_required_acceleration to)
 {
-    return mstmm_sweep_loops_closing(
+    return mstmm_sweep_loops_required_acceleration(
         to.gap, to.rate, to.relative);
 }
-#define mstmm_loops_closing(...) mstmm_loops_closing_by((struct mstmm_loops_closing){__VA_ARGS__})
+#define mstmm_loops_required_acceleration(...) mstmm_loops_required_acceleration_by((struct mstmm_loops_required_acceleration){__VA_ARGS__})
 
 struct mstmm_loops_row {
     const real *w;
@@ -1693,19 +1693,19 @@ static inline int mstmm_loops_row_by(struct mstmm_loops_row to)
 }
 #define mstmm_loops_row(...) mstmm_loops_row_by((struct mstmm_loops_row){__VA_ARGS__})
 
-struct mstmm_loops_known {
+struct mstmm_loops_known_parts {
     const real *W;
     const real *relative;
     real *l;
 };
-static inline int mstmm_loops_known_by(struct mstmm_loops_known to)
+static inline int mstmm_loops_known_parts_by(struct mstmm_loops_known_parts to)
 {
-    return mstmm_sweep_loops_known(
+    return mstmm_sweep_loops_known_parts(
         to.W, to.relative, to.l);
 }
-#define mstmm_loops_known(...) mstmm_loops_known_by((struct mstmm_loops_known){__VA_ARGS__})
+#define mstmm_loops_known_parts(...) mstmm_loops_known_parts_by((struct mstmm_loops_known_parts){__VA_ARGS__})
 
-struct mstmm_loops_told {
+struct mstmm_loops_row_acceleration {
     const real *J_A;
     const real *J_B;
     const real *l;
@@ -1713,89 +1713,89 @@ struct mstmm_loops_told {
     const real *delta_B;
     real *c;
 };
-static inline int mstmm_loops_told_by(struct mstmm_loops_told to)
+static inline int mstmm_loops_row_acceleration_by(struct mstmm_loops_row_acceleration to)
 {
-    return mstmm_sweep_loops_told(
+    return mstmm_sweep_loops_row_acceleration(
         to.J_A, to.J_B, to.l, to.delta_A, to.delta_B, to.c);
 }
-#define mstmm_loops_told(...) mstmm_loops_told_by((struct mstmm_loops_told){__VA_ARGS__})
+#define mstmm_loops_row_acceleration(...) mstmm_loops_row_acceleration_by((struct mstmm_loops_row_acceleration){__VA_ARGS__})
 
-struct mstmm_loops_act {
+struct mstmm_loops_apply_effort {
     const real *J;
     const real *tau;
     real *e;
 };
-static inline int mstmm_loops_act_by(struct mstmm_loops_act to)
+static inline int mstmm_loops_apply_effort_by(struct mstmm_loops_apply_effort to)
 {
-    return mstmm_sweep_loops_act(
+    return mstmm_sweep_loops_apply_effort(
         to.J, to.tau, to.e);
 }
-#define mstmm_loops_act(...) mstmm_loops_act_by((struct mstmm_loops_act){__VA_ARGS__})
+#define mstmm_loops_apply_effort(...) mstmm_loops_apply_effort_by((struct mstmm_loops_apply_effort){__VA_ARGS__})
 
-struct mstmm_loops_settle {
+struct mstmm_loops_pivot_inverse {
     const real *L;
     const real *floor_;
     real *inverse;
 };
-static inline int mstmm_loops_settle_by(struct mstmm_loops_settle to)
+static inline int mstmm_loops_pivot_inverse_by(struct mstmm_loops_pivot_inverse to)
 {
-    return mstmm_sweep_loops_settle(
+    return mstmm_sweep_loops_pivot_inverse(
         to.L, to.floor_, to.inverse);
 }
-#define mstmm_loops_settle(...) mstmm_loops_settle_by((struct mstmm_loops_settle){__VA_ARGS__})
+#define mstmm_loops_pivot_inverse(...) mstmm_loops_pivot_inverse_by((struct mstmm_loops_pivot_inverse){__VA_ARGS__})
 
-struct mstmm_loops_close {
+struct mstmm_loops_eliminate_row {
     const real *inverse;
     const real *K;
     const real *l;
     real *S;
     real *e;
 };
-static inline int mstmm_loops_close_by(struct mstmm_loops_close to)
+static inline int mstmm_loops_eliminate_row_by(struct mstmm_loops_eliminate_row to)
 {
-    return mstmm_sweep_loops_close(
+    return mstmm_sweep_loops_eliminate_row(
         to.inverse, to.K, to.l, to.S, to.e);
 }
-#define mstmm_loops_close(...) mstmm_loops_close_by((struct mstmm_loops_close){__VA_ARGS__})
+#define mstmm_loops_eliminate_row(...) mstmm_loops_eliminate_row_by((struct mstmm_loops_eliminate_row){__VA_ARGS__})
 
-struct mstmm_loops_shed {
+struct mstmm_loops_update_column {
     const real *inverse;
     const real *K;
     const real *L_p;
     real *K_p;
 };
-static inline int mstmm_loops_shed_by(struct mstmm_loops_shed to)
+static inline int mstmm_loops_update_column_by(struct mstmm_loops_update_column to)
 {
-    return mstmm_sweep_loops_shed(
+    return mstmm_sweep_loops_update_column(
         to.inverse, to.K, to.L_p, to.K_p);
 }
-#define mstmm_loops_shed(...) mstmm_loops_shed_by((struct mstmm_loops_shed){__VA_ARGS__})
+#define mstmm_loops_update_column(...) mstmm_loops_update_column_by((struct mstmm_loops_update_column){__VA_ARGS__})
 
-struct mstmm_loops_shed_known {
+struct mstmm_loops_update_known_part {
     const real *inverse;
     const real *l;
     const real *L_p;
     real *l_p;
 };
-static inline int mstmm_loops_shed_known_by(struct mstmm_loops_shed_known to)
+static inline int mstmm_loops_update_known_part_by(struct mstmm_loops_update_known_part to)
 {
-    return mstmm_sweep_loops_shed_known(
+    return mstmm_sweep_loops_update_known_part(
         to.inverse, to.l, to.L_p, to.l_p);
 }
-#define mstmm_loops_shed_known(...) mstmm_loops_shed_known_by((struct mstmm_loops_shed_known){__VA_ARGS__})
+#define mstmm_loops_update_known_part(...) mstmm_loops_update_known_part_by((struct mstmm_loops_update_known_part){__VA_ARGS__})
 
-struct mstmm_loops_shed_pair {
+struct mstmm_loops_update_coupling {
     const real *inverse;
     const real *L_p;
     const real *L_q;
     real *L_pq;
 };
-static inline int mstmm_loops_shed_pair_by(struct mstmm_loops_shed_pair to)
+static inline int mstmm_loops_update_coupling_by(struct mstmm_loops_update_coupling to)
 {
-    return mstmm_sweep_loops_shed_pair(
+    return mstmm_sweep_loops_update_coupling(
         to.inverse, to.L_p, to.L_q, to.L_pq);
 }
-#define mstmm_loops_shed_pair(...) mstmm_loops_shed_pair_by((struct mstmm_loops_shed_pair){__VA_ARGS__})
+#define mstmm_loops_update_coupling(...) mstmm_loops_update_coupling_by((struct mstmm_loops_update_coupling){__VA_ARGS__})
 
 struct mstmm_loops_multiplier {
     const real *inverse;
@@ -1809,56 +1809,56 @@ static inline int mstmm_loops_multiplier_by(struct mstmm_loops_multiplier to)
 }
 #define mstmm_loops_multiplier(...) mstmm_loops_multiplier_by((struct mstmm_loops_multiplier){__VA_ARGS__})
 
-struct mstmm_loops_multiplier_more {
+struct mstmm_loops_multiplier_of_motion {
     const real *inverse;
     const real *K;
     const real *delta;
     real *x;
 };
-static inline int mstmm_loops_multiplier_more_by(struct mstmm_loops_multiplier_more to)
+static inline int mstmm_loops_multiplier_of_motion_by(struct mstmm_loops_multiplier_of_motion to)
 {
-    return mstmm_sweep_loops_multiplier_more(
+    return mstmm_sweep_loops_multiplier_of_motion(
         to.inverse, to.K, to.delta, to.x);
 }
-#define mstmm_loops_multiplier_more(...) mstmm_loops_multiplier_more_by((struct mstmm_loops_multiplier_more){__VA_ARGS__})
+#define mstmm_loops_multiplier_of_motion(...) mstmm_loops_multiplier_of_motion_by((struct mstmm_loops_multiplier_of_motion){__VA_ARGS__})
 
-struct mstmm_loops_multiplier_less {
+struct mstmm_loops_multiplier_of_row {
     const real *inverse;
     const real *L_p;
     const real *x_p;
     real *x;
 };
-static inline int mstmm_loops_multiplier_less_by(struct mstmm_loops_multiplier_less to)
+static inline int mstmm_loops_multiplier_of_row_by(struct mstmm_loops_multiplier_of_row to)
 {
-    return mstmm_sweep_loops_multiplier_less(
+    return mstmm_sweep_loops_multiplier_of_row(
         to.inverse, to.L_p, to.x_p, to.x);
 }
-#define mstmm_loops_multiplier_less(...) mstmm_loops_multiplier_less_by((struct mstmm_loops_multiplier_less){__VA_ARGS__})
+#define mstmm_loops_multiplier_of_row(...) mstmm_loops_multiplier_of_row_by((struct mstmm_loops_multiplier_of_row){__VA_ARGS__})
 
-struct mstmm_loops_yielded {
+struct mstmm_loops_rotor_row_residual {
     const real *softness;
     const real *s;
     const real *x;
     real *l;
 };
-static inline int mstmm_loops_yielded_by(struct mstmm_loops_yielded to)
+static inline int mstmm_loops_rotor_row_residual_by(struct mstmm_loops_rotor_row_residual to)
 {
-    return mstmm_sweep_loops_yielded(
+    return mstmm_sweep_loops_rotor_row_residual(
         to.softness, to.s, to.x, to.l);
 }
-#define mstmm_loops_yielded(...) mstmm_loops_yielded_by((struct mstmm_loops_yielded){__VA_ARGS__})
+#define mstmm_loops_rotor_row_residual(...) mstmm_loops_rotor_row_residual_by((struct mstmm_loops_rotor_row_residual){__VA_ARGS__})
 
-struct mstmm_loops_loaded {
+struct mstmm_loops_apply_multiplier {
     const real *K;
     const real *x;
     real *e;
 };
-static inline int mstmm_loops_loaded_by(struct mstmm_loops_loaded to)
+static inline int mstmm_loops_apply_multiplier_by(struct mstmm_loops_apply_multiplier to)
 {
-    return mstmm_sweep_loops_loaded(
+    return mstmm_sweep_loops_apply_multiplier(
         to.K, to.x, to.e);
 }
-#define mstmm_loops_loaded(...) mstmm_loops_loaded_by((struct mstmm_loops_loaded){__VA_ARGS__})
+#define mstmm_loops_apply_multiplier(...) mstmm_loops_apply_multiplier_by((struct mstmm_loops_apply_multiplier){__VA_ARGS__})
 
 struct mstmm_loops_distance {
     const real *p;
@@ -1925,7 +1925,7 @@ static inline int mstmm_loops_rolling_drift_by(struct mstmm_loops_rolling_drift 
 }
 #define mstmm_loops_rolling_drift(...) mstmm_loops_rolling_drift_by((struct mstmm_loops_rolling_drift){__VA_ARGS__})
 
-struct mstmm_loops_meet_slope {
+struct mstmm_loops_relative_pose_slope {
     const real *A_C;
     const real *x_C;
     const real *A_B;
@@ -1943,13 +1943,13 @@ struct mstmm_loops_meet_slope {
     real *d_r_A;
     real *d_d;
 };
-static inline int mstmm_loops_meet_slope_by(struct mstmm_loops_meet_slope to)
+static inline int mstmm_loops_relative_pose_slope_by(struct mstmm_loops_relative_pose_slope to)
 {
-    return mstmm_sweep_loops_meet_slope(
+    return mstmm_sweep_loops_relative_pose_slope(
         to.A_C, to.x_C, to.A_B, to.x_B, to.r_e, to.Rc, to.r, to.d_A_C, to.d_x_C, to.d_A_B,
         to.d_x_B, to.d_Rc, to.d_r, to.d_R_C, to.d_r_A, to.d_d);
 }
-#define mstmm_loops_meet_slope(...) mstmm_loops_meet_slope_by((struct mstmm_loops_meet_slope){__VA_ARGS__})
+#define mstmm_loops_relative_pose_slope(...) mstmm_loops_relative_pose_slope_by((struct mstmm_loops_relative_pose_slope){__VA_ARGS__})
 
 struct mstmm_loops_slip_slope {
     const real *R_C;
@@ -2018,47 +2018,47 @@ static inline int mstmm_loops_row_slope_by(struct mstmm_loops_row_slope to)
 }
 #define mstmm_loops_row_slope(...) mstmm_loops_row_slope_by((struct mstmm_loops_row_slope){__VA_ARGS__})
 
-struct mstmm_loops_known_slope {
+struct mstmm_loops_known_parts_slope {
     const real *W;
     const real *relative;
     const real *d_W;
     const real *d_relative;
     real *d_l;
 };
-static inline int mstmm_loops_known_slope_by(struct mstmm_loops_known_slope to)
+static inline int mstmm_loops_known_parts_slope_by(struct mstmm_loops_known_parts_slope to)
 {
-    return mstmm_sweep_loops_known_slope(
+    return mstmm_sweep_loops_known_parts_slope(
         to.W, to.relative, to.d_W, to.d_relative, to.d_l);
 }
-#define mstmm_loops_known_slope(...) mstmm_loops_known_slope_by((struct mstmm_loops_known_slope){__VA_ARGS__})
+#define mstmm_loops_known_parts_slope(...) mstmm_loops_known_parts_slope_by((struct mstmm_loops_known_parts_slope){__VA_ARGS__})
 
-struct mstmm_loops_act_slope {
+struct mstmm_loops_apply_effort_slope {
     const real *J;
     const real *tau;
     const real *d_J;
     const real *d_tau;
     real *d_e;
 };
-static inline int mstmm_loops_act_slope_by(struct mstmm_loops_act_slope to)
+static inline int mstmm_loops_apply_effort_slope_by(struct mstmm_loops_apply_effort_slope to)
 {
-    return mstmm_sweep_loops_act_slope(
+    return mstmm_sweep_loops_apply_effort_slope(
         to.J, to.tau, to.d_J, to.d_tau, to.d_e);
 }
-#define mstmm_loops_act_slope(...) mstmm_loops_act_slope_by((struct mstmm_loops_act_slope){__VA_ARGS__})
+#define mstmm_loops_apply_effort_slope(...) mstmm_loops_apply_effort_slope_by((struct mstmm_loops_apply_effort_slope){__VA_ARGS__})
 
-struct mstmm_loops_loaded_slope {
+struct mstmm_loops_apply_multiplier_slope {
     const real *K;
     const real *x;
     const real *d_K;
     const real *d_x;
     real *d_e;
 };
-static inline int mstmm_loops_loaded_slope_by(struct mstmm_loops_loaded_slope to)
+static inline int mstmm_loops_apply_multiplier_slope_by(struct mstmm_loops_apply_multiplier_slope to)
 {
-    return mstmm_sweep_loops_loaded_slope(
+    return mstmm_sweep_loops_apply_multiplier_slope(
         to.K, to.x, to.d_K, to.d_x, to.d_e);
 }
-#define mstmm_loops_loaded_slope(...) mstmm_loops_loaded_slope_by((struct mstmm_loops_loaded_slope){__VA_ARGS__})
+#define mstmm_loops_apply_multiplier_slope(...) mstmm_loops_apply_multiplier_slope_by((struct mstmm_loops_apply_multiplier_slope){__VA_ARGS__})
 
 struct mstmm_loops_distance_slope {
     const real *p;
@@ -2216,17 +2216,17 @@ static inline int mstmm_planar_point_by(struct mstmm_planar_point to)
 }
 #define mstmm_planar_point(...) mstmm_planar_point_by((struct mstmm_planar_point){__VA_ARGS__})
 
-struct mstmm_planar_turning {
+struct mstmm_planar_angular_motion {
     const real *A;
     const real *motion;
     real *w_K;
 };
-static inline int mstmm_planar_turning_by(struct mstmm_planar_turning to)
+static inline int mstmm_planar_angular_motion_by(struct mstmm_planar_angular_motion to)
 {
-    return mstmm_sweep_planar_pin_turning(
+    return mstmm_sweep_planar_pin_angular_motion(
         to.A, to.motion, to.w_K);
 }
-#define mstmm_planar_turning(...) mstmm_planar_turning_by((struct mstmm_planar_turning){__VA_ARGS__})
+#define mstmm_planar_angular_motion(...) mstmm_planar_angular_motion_by((struct mstmm_planar_angular_motion){__VA_ARGS__})
 
 struct mstmm_planar_end_frame {
     const real *A;
@@ -2272,7 +2272,7 @@ static inline int mstmm_planar_factor_by(struct mstmm_planar_factor to)
 }
 #define mstmm_planar_factor(...) mstmm_planar_factor_by((struct mstmm_planar_factor){__VA_ARGS__})
 
-struct mstmm_planar_push {
+struct mstmm_planar_column_load {
     const real *Rc;
     const real *r;
     const real *G;
@@ -2281,14 +2281,14 @@ struct mstmm_planar_push {
     real *y;
     real *e_I;
 };
-static inline int mstmm_planar_push_by(struct mstmm_planar_push to)
+static inline int mstmm_planar_column_load_by(struct mstmm_planar_column_load to)
 {
-    return mstmm_sweep_planar_pin_push(
+    return mstmm_sweep_planar_pin_column_load(
         to.Rc, to.r, to.G, to.e, to.tau, to.y, to.e_I);
 }
-#define mstmm_planar_push(...) mstmm_planar_push_by((struct mstmm_planar_push){__VA_ARGS__})
+#define mstmm_planar_column_load(...) mstmm_planar_column_load_by((struct mstmm_planar_column_load){__VA_ARGS__})
 
-struct mstmm_planar_answer {
+struct mstmm_planar_column_acceleration {
     const real *Rc;
     const real *r;
     const real *F;
@@ -2298,12 +2298,12 @@ struct mstmm_planar_answer {
     real *udot;
     real *delta;
 };
-static inline int mstmm_planar_answer_by(struct mstmm_planar_answer to)
+static inline int mstmm_planar_column_acceleration_by(struct mstmm_planar_column_acceleration to)
 {
-    return mstmm_sweep_planar_pin_answer(
+    return mstmm_sweep_planar_pin_column_acceleration(
         to.Rc, to.r, to.F, to.G, to.y, to.delta_I, to.udot, to.delta);
 }
-#define mstmm_planar_answer(...) mstmm_planar_answer_by((struct mstmm_planar_answer){__VA_ARGS__})
+#define mstmm_planar_column_acceleration(...) mstmm_planar_column_acceleration_by((struct mstmm_planar_column_acceleration){__VA_ARGS__})
 
 struct mstmm_planar_divide {
     const real *F;
@@ -2329,43 +2329,43 @@ static inline int mstmm_planar_couple_by(struct mstmm_planar_couple to)
 }
 #define mstmm_planar_couple(...) mstmm_planar_couple_by((struct mstmm_planar_couple){__VA_ARGS__})
 
-struct mstmm_planar_answered {
+struct mstmm_planar_add_known_part {
     const real *y;
     const real *z;
     real *l;
 };
-static inline int mstmm_planar_answered_by(struct mstmm_planar_answered to)
+static inline int mstmm_planar_add_known_part_by(struct mstmm_planar_add_known_part to)
 {
-    return mstmm_sweep_planar_pin_answered(
+    return mstmm_sweep_planar_pin_add_known_part(
         to.y, to.z, to.l);
 }
-#define mstmm_planar_answered(...) mstmm_planar_answered_by((struct mstmm_planar_answered){__VA_ARGS__})
+#define mstmm_planar_add_known_part(...) mstmm_planar_add_known_part_by((struct mstmm_planar_add_known_part){__VA_ARGS__})
 
-struct mstmm_planar_pull {
+struct mstmm_planar_add_multiplier_effort {
     const real *y;
     const real *x;
     real *y_0;
 };
-static inline int mstmm_planar_pull_by(struct mstmm_planar_pull to)
+static inline int mstmm_planar_add_multiplier_effort_by(struct mstmm_planar_add_multiplier_effort to)
 {
-    return mstmm_sweep_planar_pin_pull(
+    return mstmm_sweep_planar_pin_add_multiplier_effort(
         to.y, to.x, to.y_0);
 }
-#define mstmm_planar_pull(...) mstmm_planar_pull_by((struct mstmm_planar_pull){__VA_ARGS__})
+#define mstmm_planar_add_multiplier_effort(...) mstmm_planar_add_multiplier_effort_by((struct mstmm_planar_add_multiplier_effort){__VA_ARGS__})
 
-struct mstmm_planar_push_on_ground {
+struct mstmm_planar_ground_column_load {
     const real *e;
     const real *tau;
     real *y;
 };
-static inline int mstmm_planar_push_on_ground_by(struct mstmm_planar_push_on_ground to)
+static inline int mstmm_planar_ground_column_load_by(struct mstmm_planar_ground_column_load to)
 {
-    return mstmm_sweep_planar_pin_push_on_ground(
+    return mstmm_sweep_planar_pin_ground_column_load(
         to.e, to.tau, to.y);
 }
-#define mstmm_planar_push_on_ground(...) mstmm_planar_push_on_ground_by((struct mstmm_planar_push_on_ground){__VA_ARGS__})
+#define mstmm_planar_ground_column_load(...) mstmm_planar_ground_column_load_by((struct mstmm_planar_ground_column_load){__VA_ARGS__})
 
-struct mstmm_planar_meet {
+struct mstmm_planar_relative_pose {
     const real *A_C;
     const real *x_C;
     const real *A_B;
@@ -2377,12 +2377,12 @@ struct mstmm_planar_meet {
     real *r_A;
     real *d;
 };
-static inline int mstmm_planar_meet_by(struct mstmm_planar_meet to)
+static inline int mstmm_planar_relative_pose_by(struct mstmm_planar_relative_pose to)
 {
-    return mstmm_sweep_planar_pin_meet(
+    return mstmm_sweep_planar_pin_relative_pose(
         to.A_C, to.x_C, to.A_B, to.x_B, to.r_e, to.Rc, to.r, to.R_C, to.r_A, to.d);
 }
-#define mstmm_planar_meet(...) mstmm_planar_meet_by((struct mstmm_planar_meet){__VA_ARGS__})
+#define mstmm_planar_relative_pose(...) mstmm_planar_relative_pose_by((struct mstmm_planar_relative_pose){__VA_ARGS__})
 
 struct mstmm_planar_slip {
     const real *R_C;
@@ -2433,19 +2433,19 @@ static inline int mstmm_planar_row_by(struct mstmm_planar_row to)
 }
 #define mstmm_planar_row(...) mstmm_planar_row_by((struct mstmm_planar_row){__VA_ARGS__})
 
-struct mstmm_planar_known {
+struct mstmm_planar_known_parts {
     const real *W;
     const real *relative;
     real *l;
 };
-static inline int mstmm_planar_known_by(struct mstmm_planar_known to)
+static inline int mstmm_planar_known_parts_by(struct mstmm_planar_known_parts to)
 {
-    return mstmm_sweep_planar_pin_known(
+    return mstmm_sweep_planar_pin_known_parts(
         to.W, to.relative, to.l);
 }
-#define mstmm_planar_known(...) mstmm_planar_known_by((struct mstmm_planar_known){__VA_ARGS__})
+#define mstmm_planar_known_parts(...) mstmm_planar_known_parts_by((struct mstmm_planar_known_parts){__VA_ARGS__})
 
-struct mstmm_planar_told {
+struct mstmm_planar_row_acceleration {
     const real *J_A;
     const real *J_B;
     const real *l;
@@ -2453,64 +2453,64 @@ struct mstmm_planar_told {
     const real *delta_B;
     real *c;
 };
-static inline int mstmm_planar_told_by(struct mstmm_planar_told to)
+static inline int mstmm_planar_row_acceleration_by(struct mstmm_planar_row_acceleration to)
 {
-    return mstmm_sweep_planar_pin_told(
+    return mstmm_sweep_planar_pin_row_acceleration(
         to.J_A, to.J_B, to.l, to.delta_A, to.delta_B, to.c);
 }
-#define mstmm_planar_told(...) mstmm_planar_told_by((struct mstmm_planar_told){__VA_ARGS__})
+#define mstmm_planar_row_acceleration(...) mstmm_planar_row_acceleration_by((struct mstmm_planar_row_acceleration){__VA_ARGS__})
 
-struct mstmm_planar_act {
+struct mstmm_planar_apply_effort {
     const real *J;
     const real *tau;
     real *e;
 };
-static inline int mstmm_planar_act_by(struct mstmm_planar_act to)
+static inline int mstmm_planar_apply_effort_by(struct mstmm_planar_apply_effort to)
 {
-    return mstmm_sweep_planar_pin_act(
+    return mstmm_sweep_planar_pin_apply_effort(
         to.J, to.tau, to.e);
 }
-#define mstmm_planar_act(...) mstmm_planar_act_by((struct mstmm_planar_act){__VA_ARGS__})
+#define mstmm_planar_apply_effort(...) mstmm_planar_apply_effort_by((struct mstmm_planar_apply_effort){__VA_ARGS__})
 
-struct mstmm_planar_close {
+struct mstmm_planar_eliminate_row {
     const real *inverse;
     const real *K;
     const real *l;
     real *S;
     real *e;
 };
-static inline int mstmm_planar_close_by(struct mstmm_planar_close to)
+static inline int mstmm_planar_eliminate_row_by(struct mstmm_planar_eliminate_row to)
 {
-    return mstmm_sweep_planar_pin_close(
+    return mstmm_sweep_planar_pin_eliminate_row(
         to.inverse, to.K, to.l, to.S, to.e);
 }
-#define mstmm_planar_close(...) mstmm_planar_close_by((struct mstmm_planar_close){__VA_ARGS__})
+#define mstmm_planar_eliminate_row(...) mstmm_planar_eliminate_row_by((struct mstmm_planar_eliminate_row){__VA_ARGS__})
 
-struct mstmm_planar_shed {
+struct mstmm_planar_update_column {
     const real *inverse;
     const real *K;
     const real *L_p;
     real *K_p;
 };
-static inline int mstmm_planar_shed_by(struct mstmm_planar_shed to)
+static inline int mstmm_planar_update_column_by(struct mstmm_planar_update_column to)
 {
-    return mstmm_sweep_planar_pin_shed(
+    return mstmm_sweep_planar_pin_update_column(
         to.inverse, to.K, to.L_p, to.K_p);
 }
-#define mstmm_planar_shed(...) mstmm_planar_shed_by((struct mstmm_planar_shed){__VA_ARGS__})
+#define mstmm_planar_update_column(...) mstmm_planar_update_column_by((struct mstmm_planar_update_column){__VA_ARGS__})
 
-struct mstmm_planar_multiplier_more {
+struct mstmm_planar_multiplier_of_motion {
     const real *inverse;
     const real *K;
     const real *delta;
     real *x;
 };
-static inline int mstmm_planar_multiplier_more_by(struct mstmm_planar_multiplier_more to)
+static inline int mstmm_planar_multiplier_of_motion_by(struct mstmm_planar_multiplier_of_motion to)
 {
-    return mstmm_sweep_planar_pin_multiplier_more(
+    return mstmm_sweep_planar_pin_multiplier_of_motion(
         to.inverse, to.K, to.delta, to.x);
 }
-#define mstmm_planar_multiplier_more(...) mstmm_planar_multiplier_more_by((struct mstmm_planar_multiplier_more){__VA_ARGS__})
+#define mstmm_planar_multiplier_of_motion(...) mstmm_planar_multiplier_of_motion_by((struct mstmm_planar_multiplier_of_motion){__VA_ARGS__})
 
 struct mstmm_classical_body_transfer {
     const real *M;
@@ -3268,21 +3268,21 @@ static inline int mstmm_generic_effort_by(int speeds, struct mstmm_generic_effor
 }
 #define mstmm_generic_effort(speeds, ...) mstmm_generic_effort_by(speeds, (struct mstmm_generic_effort){__VA_ARGS__})
 
-struct mstmm_generic_exerted {
+struct mstmm_generic_required_load {
     const real *S;
     const real *H;
     const real *udot;
     real *e;
 };
-typedef int mstmm_generic_exerted_kernel(
+typedef int mstmm_generic_required_load_kernel(
     const real *restrict, const real *restrict, const real *restrict, real *restrict);
-extern mstmm_generic_exerted_kernel *const mstmm_generic_exerted_table[];
-static inline int mstmm_generic_exerted_by(int speeds, struct mstmm_generic_exerted to)
+extern mstmm_generic_required_load_kernel *const mstmm_generic_required_load_table[];
+static inline int mstmm_generic_required_load_by(int speeds, struct mstmm_generic_required_load to)
 {
-    return mstmm_generic_exerted_table[speeds](
+    return mstmm_generic_required_load_table[speeds](
         to.S, to.H, to.udot, to.e);
 }
-#define mstmm_generic_exerted(speeds, ...) mstmm_generic_exerted_by(speeds, (struct mstmm_generic_exerted){__VA_ARGS__})
+#define mstmm_generic_required_load(speeds, ...) mstmm_generic_required_load_by(speeds, (struct mstmm_generic_required_load){__VA_ARGS__})
 
 struct mstmm_generic_project {
     const real *Rc;
@@ -3327,7 +3327,7 @@ static inline int mstmm_generic_factor_by(int speeds, struct mstmm_generic_facto
 }
 #define mstmm_generic_factor(speeds, ...) mstmm_generic_factor_by(speeds, (struct mstmm_generic_factor){__VA_ARGS__})
 
-struct mstmm_generic_push {
+struct mstmm_generic_column_load {
     const real *Rc;
     const real *r;
     const real *H;
@@ -3337,34 +3337,34 @@ struct mstmm_generic_push {
     real *y;
     real *e_I;
 };
-typedef int mstmm_generic_push_kernel(
+typedef int mstmm_generic_column_load_kernel(
     const real *restrict, const real *restrict, const real *restrict, const real *restrict,
     const real *restrict, const real *restrict, real *restrict, real *restrict);
-extern mstmm_generic_push_kernel *const mstmm_generic_push_table[];
-static inline int mstmm_generic_push_by(int speeds, struct mstmm_generic_push to)
+extern mstmm_generic_column_load_kernel *const mstmm_generic_column_load_table[];
+static inline int mstmm_generic_column_load_by(int speeds, struct mstmm_generic_column_load to)
 {
-    return mstmm_generic_push_table[speeds](
+    return mstmm_generic_column_load_table[speeds](
         to.Rc, to.r, to.H, to.G, to.e, to.tau, to.y, to.e_I);
 }
-#define mstmm_generic_push(speeds, ...) mstmm_generic_push_by(speeds, (struct mstmm_generic_push){__VA_ARGS__})
+#define mstmm_generic_column_load(speeds, ...) mstmm_generic_column_load_by(speeds, (struct mstmm_generic_column_load){__VA_ARGS__})
 
-struct mstmm_generic_push_on_ground {
+struct mstmm_generic_ground_column_load {
     const real *H;
     const real *e;
     const real *tau;
     real *y;
 };
-typedef int mstmm_generic_push_on_ground_kernel(
+typedef int mstmm_generic_ground_column_load_kernel(
     const real *restrict, const real *restrict, const real *restrict, real *restrict);
-extern mstmm_generic_push_on_ground_kernel *const mstmm_generic_push_on_ground_table[];
-static inline int mstmm_generic_push_on_ground_by(int speeds, struct mstmm_generic_push_on_ground to)
+extern mstmm_generic_ground_column_load_kernel *const mstmm_generic_ground_column_load_table[];
+static inline int mstmm_generic_ground_column_load_by(int speeds, struct mstmm_generic_ground_column_load to)
 {
-    return mstmm_generic_push_on_ground_table[speeds](
+    return mstmm_generic_ground_column_load_table[speeds](
         to.H, to.e, to.tau, to.y);
 }
-#define mstmm_generic_push_on_ground(speeds, ...) mstmm_generic_push_on_ground_by(speeds, (struct mstmm_generic_push_on_ground){__VA_ARGS__})
+#define mstmm_generic_ground_column_load(speeds, ...) mstmm_generic_ground_column_load_by(speeds, (struct mstmm_generic_ground_column_load){__VA_ARGS__})
 
-struct mstmm_generic_answer {
+struct mstmm_generic_column_acceleration {
     const real *Rc;
     const real *r;
     const real *H;
@@ -3375,17 +3375,17 @@ struct mstmm_generic_answer {
     real *udot;
     real *delta;
 };
-typedef int mstmm_generic_answer_kernel(
+typedef int mstmm_generic_column_acceleration_kernel(
     const real *restrict, const real *restrict, const real *restrict, const real *restrict,
     const real *restrict, const real *restrict, const real *restrict, real *restrict,
     real *restrict);
-extern mstmm_generic_answer_kernel *const mstmm_generic_answer_table[];
-static inline int mstmm_generic_answer_by(int speeds, struct mstmm_generic_answer to)
+extern mstmm_generic_column_acceleration_kernel *const mstmm_generic_column_acceleration_table[];
+static inline int mstmm_generic_column_acceleration_by(int speeds, struct mstmm_generic_column_acceleration to)
 {
-    return mstmm_generic_answer_table[speeds](
+    return mstmm_generic_column_acceleration_table[speeds](
         to.Rc, to.r, to.H, to.F, to.G, to.y, to.delta_I, to.udot, to.delta);
 }
-#define mstmm_generic_answer(speeds, ...) mstmm_generic_answer_by(speeds, (struct mstmm_generic_answer){__VA_ARGS__})
+#define mstmm_generic_column_acceleration(speeds, ...) mstmm_generic_column_acceleration_by(speeds, (struct mstmm_generic_column_acceleration){__VA_ARGS__})
 
 struct mstmm_generic_qr_eliminate {
     const real *H;
@@ -3457,35 +3457,35 @@ static inline int mstmm_generic_couple_by(int speeds, struct mstmm_generic_coupl
 }
 #define mstmm_generic_couple(speeds, ...) mstmm_generic_couple_by(speeds, (struct mstmm_generic_couple){__VA_ARGS__})
 
-struct mstmm_generic_answered {
+struct mstmm_generic_add_known_part {
     const real *y;
     const real *z;
     real *l;
 };
-typedef int mstmm_generic_answered_kernel(
+typedef int mstmm_generic_add_known_part_kernel(
     const real *restrict, const real *restrict, real *restrict);
-extern mstmm_generic_answered_kernel *const mstmm_generic_answered_table[];
-static inline int mstmm_generic_answered_by(int speeds, struct mstmm_generic_answered to)
+extern mstmm_generic_add_known_part_kernel *const mstmm_generic_add_known_part_table[];
+static inline int mstmm_generic_add_known_part_by(int speeds, struct mstmm_generic_add_known_part to)
 {
-    return mstmm_generic_answered_table[speeds](
+    return mstmm_generic_add_known_part_table[speeds](
         to.y, to.z, to.l);
 }
-#define mstmm_generic_answered(speeds, ...) mstmm_generic_answered_by(speeds, (struct mstmm_generic_answered){__VA_ARGS__})
+#define mstmm_generic_add_known_part(speeds, ...) mstmm_generic_add_known_part_by(speeds, (struct mstmm_generic_add_known_part){__VA_ARGS__})
 
-struct mstmm_generic_pull {
+struct mstmm_generic_add_multiplier_effort {
     const real *y;
     const real *x;
     real *y_0;
 };
-typedef int mstmm_generic_pull_kernel(
+typedef int mstmm_generic_add_multiplier_effort_kernel(
     const real *restrict, const real *restrict, real *restrict);
-extern mstmm_generic_pull_kernel *const mstmm_generic_pull_table[];
-static inline int mstmm_generic_pull_by(int speeds, struct mstmm_generic_pull to)
+extern mstmm_generic_add_multiplier_effort_kernel *const mstmm_generic_add_multiplier_effort_table[];
+static inline int mstmm_generic_add_multiplier_effort_by(int speeds, struct mstmm_generic_add_multiplier_effort to)
 {
-    return mstmm_generic_pull_table[speeds](
+    return mstmm_generic_add_multiplier_effort_table[speeds](
         to.y, to.x, to.y_0);
 }
-#define mstmm_generic_pull(speeds, ...) mstmm_generic_pull_by(speeds, (struct mstmm_generic_pull){__VA_ARGS__})
+#define mstmm_generic_add_multiplier_effort(speeds, ...) mstmm_generic_add_multiplier_effort_by(speeds, (struct mstmm_generic_add_multiplier_effort){__VA_ARGS__})
 
 struct mstmm_generic_forward_slope {
     const real *Rt;
@@ -3558,41 +3558,41 @@ static inline int mstmm_generic_complement_slope_by(int speeds, struct mstmm_gen
 }
 #define mstmm_generic_complement_slope(speeds, ...) mstmm_generic_complement_slope_by(speeds, (struct mstmm_generic_complement_slope){__VA_ARGS__})
 
-struct mstmm_generic_answered_slope {
+struct mstmm_generic_add_known_part_slope {
     const real *y;
     const real *z;
     const real *d_y;
     const real *d_z;
     real *d_l;
 };
-typedef int mstmm_generic_answered_slope_kernel(
+typedef int mstmm_generic_add_known_part_slope_kernel(
     const real *restrict, const real *restrict, const real *restrict, const real *restrict,
     real *restrict);
-extern mstmm_generic_answered_slope_kernel *const mstmm_generic_answered_slope_table[];
-static inline int mstmm_generic_answered_slope_by(int speeds, struct mstmm_generic_answered_slope to)
+extern mstmm_generic_add_known_part_slope_kernel *const mstmm_generic_add_known_part_slope_table[];
+static inline int mstmm_generic_add_known_part_slope_by(int speeds, struct mstmm_generic_add_known_part_slope to)
 {
-    return mstmm_generic_answered_slope_table[speeds](
+    return mstmm_generic_add_known_part_slope_table[speeds](
         to.y, to.z, to.d_y, to.d_z, to.d_l);
 }
-#define mstmm_generic_answered_slope(speeds, ...) mstmm_generic_answered_slope_by(speeds, (struct mstmm_generic_answered_slope){__VA_ARGS__})
+#define mstmm_generic_add_known_part_slope(speeds, ...) mstmm_generic_add_known_part_slope_by(speeds, (struct mstmm_generic_add_known_part_slope){__VA_ARGS__})
 
-struct mstmm_generic_pull_slope {
+struct mstmm_generic_add_multiplier_effort_slope {
     const real *y;
     const real *x;
     const real *d_y;
     const real *d_x;
     real *d_y_0;
 };
-typedef int mstmm_generic_pull_slope_kernel(
+typedef int mstmm_generic_add_multiplier_effort_slope_kernel(
     const real *restrict, const real *restrict, const real *restrict, const real *restrict,
     real *restrict);
-extern mstmm_generic_pull_slope_kernel *const mstmm_generic_pull_slope_table[];
-static inline int mstmm_generic_pull_slope_by(int speeds, struct mstmm_generic_pull_slope to)
+extern mstmm_generic_add_multiplier_effort_slope_kernel *const mstmm_generic_add_multiplier_effort_slope_table[];
+static inline int mstmm_generic_add_multiplier_effort_slope_by(int speeds, struct mstmm_generic_add_multiplier_effort_slope to)
 {
-    return mstmm_generic_pull_slope_table[speeds](
+    return mstmm_generic_add_multiplier_effort_slope_table[speeds](
         to.y, to.x, to.d_y, to.d_x, to.d_y_0);
 }
-#define mstmm_generic_pull_slope(speeds, ...) mstmm_generic_pull_slope_by(speeds, (struct mstmm_generic_pull_slope){__VA_ARGS__})
+#define mstmm_generic_add_multiplier_effort_slope(speeds, ...) mstmm_generic_add_multiplier_effort_slope_by(speeds, (struct mstmm_generic_add_multiplier_effort_slope){__VA_ARGS__})
 
 struct mstmm_generic_tangent_carrier {
     const real *H;
@@ -3649,21 +3649,21 @@ static inline int mstmm_generic_tangent_column_by(int speeds, struct mstmm_gener
 }
 #define mstmm_generic_tangent_column(speeds, ...) mstmm_generic_tangent_column_by(speeds, (struct mstmm_generic_tangent_column){__VA_ARGS__})
 
-struct mstmm_generic_tangent_along {
+struct mstmm_generic_tangent_coordinate_change {
     const real *H;
     const real *d_q;
     real *theta;
     real *x;
 };
-typedef int mstmm_generic_tangent_along_kernel(
+typedef int mstmm_generic_tangent_coordinate_change_kernel(
     const real *restrict, const real *restrict, real *restrict, real *restrict);
-extern mstmm_generic_tangent_along_kernel *const mstmm_generic_tangent_along_table[];
-static inline int mstmm_generic_tangent_along_by(int speeds, struct mstmm_generic_tangent_along to)
+extern mstmm_generic_tangent_coordinate_change_kernel *const mstmm_generic_tangent_coordinate_change_table[];
+static inline int mstmm_generic_tangent_coordinate_change_by(int speeds, struct mstmm_generic_tangent_coordinate_change to)
 {
-    return mstmm_generic_tangent_along_table[speeds](
+    return mstmm_generic_tangent_coordinate_change_table[speeds](
         to.H, to.d_q, to.theta, to.x);
 }
-#define mstmm_generic_tangent_along(speeds, ...) mstmm_generic_tangent_along_by(speeds, (struct mstmm_generic_tangent_along){__VA_ARGS__})
+#define mstmm_generic_tangent_coordinate_change(speeds, ...) mstmm_generic_tangent_coordinate_change_by(speeds, (struct mstmm_generic_tangent_coordinate_change){__VA_ARGS__})
 
 struct mstmm_generic_tangent_steady {
     const real *theta;
@@ -3695,7 +3695,7 @@ static inline int mstmm_generic_tangent_steady_by(int speeds, struct mstmm_gener
 }
 #define mstmm_generic_tangent_steady(speeds, ...) mstmm_generic_tangent_steady_by(speeds, (struct mstmm_generic_tangent_steady){__VA_ARGS__})
 
-struct mstmm_generic_tangent_turning {
+struct mstmm_generic_tangent_rotational {
     const real *theta;
     const real *H;
     const real *w;
@@ -3709,17 +3709,17 @@ struct mstmm_generic_tangent_turning {
     real *G;
     real *row;
 };
-typedef int mstmm_generic_tangent_turning_kernel(
+typedef int mstmm_generic_tangent_rotational_kernel(
     const real *restrict, const real *restrict, const real *restrict, const real *restrict,
     const real *restrict, const real *restrict, const real *restrict, const real *restrict,
     const real *restrict, real *restrict, real *restrict, real *restrict);
-extern mstmm_generic_tangent_turning_kernel *const mstmm_generic_tangent_turning_table[];
-static inline int mstmm_generic_tangent_turning_by(int speeds, struct mstmm_generic_tangent_turning to)
+extern mstmm_generic_tangent_rotational_kernel *const mstmm_generic_tangent_rotational_table[];
+static inline int mstmm_generic_tangent_rotational_by(int speeds, struct mstmm_generic_tangent_rotational to)
 {
-    return mstmm_generic_tangent_turning_table[speeds](
+    return mstmm_generic_tangent_rotational_table[speeds](
         to.theta, to.H, to.w, to.Q, to.f, to.d_u, to.d_s, to.J, to.laws, to.B, to.G, to.row);
 }
-#define mstmm_generic_tangent_turning(speeds, ...) mstmm_generic_tangent_turning_by(speeds, (struct mstmm_generic_tangent_turning){__VA_ARGS__})
+#define mstmm_generic_tangent_rotational(speeds, ...) mstmm_generic_tangent_rotational_by(speeds, (struct mstmm_generic_tangent_rotational){__VA_ARGS__})
 
 struct mstmm_generic_tangent_rows {
     const real *H;
@@ -3762,7 +3762,7 @@ static inline int mstmm_generic_tangent_reduce_by(int speeds, struct mstmm_gener
 }
 #define mstmm_generic_tangent_reduce(speeds, ...) mstmm_generic_tangent_reduce_by(speeds, (struct mstmm_generic_tangent_reduce){__VA_ARGS__})
 
-struct mstmm_generic_tangent_push {
+struct mstmm_generic_tangent_load {
     const real *Rc;
     const real *r;
     const real *H;
@@ -3773,19 +3773,19 @@ struct mstmm_generic_tangent_push {
     real *y;
     real *e_I;
 };
-typedef int mstmm_generic_tangent_push_kernel(
+typedef int mstmm_generic_tangent_load_kernel(
     const real *restrict, const real *restrict, const real *restrict, const real *restrict,
     const real *restrict, const real *restrict, const real *restrict, real *restrict,
     real *restrict);
-extern mstmm_generic_tangent_push_kernel *const mstmm_generic_tangent_push_table[];
-static inline int mstmm_generic_tangent_push_by(int speeds, struct mstmm_generic_tangent_push to)
+extern mstmm_generic_tangent_load_kernel *const mstmm_generic_tangent_load_table[];
+static inline int mstmm_generic_tangent_load_by(int speeds, struct mstmm_generic_tangent_load to)
 {
-    return mstmm_generic_tangent_push_table[speeds](
+    return mstmm_generic_tangent_load_table[speeds](
         to.Rc, to.r, to.H, to.V, to.inverse, to.e, to.e_f, to.y, to.e_I);
 }
-#define mstmm_generic_tangent_push(speeds, ...) mstmm_generic_tangent_push_by(speeds, (struct mstmm_generic_tangent_push){__VA_ARGS__})
+#define mstmm_generic_tangent_load(speeds, ...) mstmm_generic_tangent_load_by(speeds, (struct mstmm_generic_tangent_load){__VA_ARGS__})
 
-struct mstmm_generic_tangent_answer {
+struct mstmm_generic_tangent_solution {
     const real *Rc;
     const real *r;
     const real *w_I;
@@ -3798,19 +3798,19 @@ struct mstmm_generic_tangent_answer {
     real *x;
     real *z;
 };
-typedef int mstmm_generic_tangent_answer_kernel(
+typedef int mstmm_generic_tangent_solution_kernel(
     const real *restrict, const real *restrict, const real *restrict, const real *restrict,
     const real *restrict, const real *restrict, const real *restrict, const real *restrict,
     const real *restrict, real *restrict, real *restrict);
-extern mstmm_generic_tangent_answer_kernel *const mstmm_generic_tangent_answer_table[];
-static inline int mstmm_generic_tangent_answer_by(int speeds, struct mstmm_generic_tangent_answer to)
+extern mstmm_generic_tangent_solution_kernel *const mstmm_generic_tangent_solution_table[];
+static inline int mstmm_generic_tangent_solution_by(int speeds, struct mstmm_generic_tangent_solution to)
 {
-    return mstmm_generic_tangent_answer_table[speeds](
+    return mstmm_generic_tangent_solution_table[speeds](
         to.Rc, to.r, to.w_I, to.v, to.w, to.z_I, to.B, to.gain, to.y, to.x, to.z);
 }
-#define mstmm_generic_tangent_answer(speeds, ...) mstmm_generic_tangent_answer_by(speeds, (struct mstmm_generic_tangent_answer){__VA_ARGS__})
+#define mstmm_generic_tangent_solution(speeds, ...) mstmm_generic_tangent_solution_by(speeds, (struct mstmm_generic_tangent_solution){__VA_ARGS__})
 
-struct mstmm_generic_tangent_push_known {
+struct mstmm_generic_tangent_load_with_increments {
     const real *Rc;
     const real *r;
     const real *H;
@@ -3822,19 +3822,19 @@ struct mstmm_generic_tangent_push_known {
     real *y;
     real *e_I;
 };
-typedef int mstmm_generic_tangent_push_known_kernel(
+typedef int mstmm_generic_tangent_load_with_increments_kernel(
     const real *restrict, const real *restrict, const real *restrict, const real *restrict,
     const real *restrict, const real *restrict, const real *restrict, const real *restrict,
     real *restrict, real *restrict);
-extern mstmm_generic_tangent_push_known_kernel *const mstmm_generic_tangent_push_known_table[];
-static inline int mstmm_generic_tangent_push_known_by(int speeds, struct mstmm_generic_tangent_push_known to)
+extern mstmm_generic_tangent_load_with_increments_kernel *const mstmm_generic_tangent_load_with_increments_table[];
+static inline int mstmm_generic_tangent_load_with_increments_by(int speeds, struct mstmm_generic_tangent_load_with_increments to)
 {
-    return mstmm_generic_tangent_push_known_table[speeds](
+    return mstmm_generic_tangent_load_with_increments_table[speeds](
         to.Rc, to.r, to.H, to.V, to.inverse, to.e, to.e_f, to.e_b, to.y, to.e_I);
 }
-#define mstmm_generic_tangent_push_known(speeds, ...) mstmm_generic_tangent_push_known_by(speeds, (struct mstmm_generic_tangent_push_known){__VA_ARGS__})
+#define mstmm_generic_tangent_load_with_increments(speeds, ...) mstmm_generic_tangent_load_with_increments_by(speeds, (struct mstmm_generic_tangent_load_with_increments){__VA_ARGS__})
 
-struct mstmm_generic_tangent_answer_known {
+struct mstmm_generic_tangent_solution_with_increments {
     const real *Rc;
     const real *r;
     const real *w_I;
@@ -3848,17 +3848,17 @@ struct mstmm_generic_tangent_answer_known {
     real *x;
     real *z;
 };
-typedef int mstmm_generic_tangent_answer_known_kernel(
+typedef int mstmm_generic_tangent_solution_with_increments_kernel(
     const real *restrict, const real *restrict, const real *restrict, const real *restrict,
     const real *restrict, const real *restrict, const real *restrict, const real *restrict,
     const real *restrict, const real *restrict, real *restrict, real *restrict);
-extern mstmm_generic_tangent_answer_known_kernel *const mstmm_generic_tangent_answer_known_table[];
-static inline int mstmm_generic_tangent_answer_known_by(int speeds, struct mstmm_generic_tangent_answer_known to)
+extern mstmm_generic_tangent_solution_with_increments_kernel *const mstmm_generic_tangent_solution_with_increments_table[];
+static inline int mstmm_generic_tangent_solution_with_increments_by(int speeds, struct mstmm_generic_tangent_solution_with_increments to)
 {
-    return mstmm_generic_tangent_answer_known_table[speeds](
+    return mstmm_generic_tangent_solution_with_increments_table[speeds](
         to.Rc, to.r, to.w_I, to.v, to.w, to.z_I, to.B, to.gain, to.y, to.b, to.x, to.z);
 }
-#define mstmm_generic_tangent_answer_known(speeds, ...) mstmm_generic_tangent_answer_known_by(speeds, (struct mstmm_generic_tangent_answer_known){__VA_ARGS__})
+#define mstmm_generic_tangent_solution_with_increments(speeds, ...) mstmm_generic_tangent_solution_with_increments_by(speeds, (struct mstmm_generic_tangent_solution_with_increments){__VA_ARGS__})
 
 struct mstmm_hinge_hinge {
     const real *p;
@@ -4041,7 +4041,7 @@ static inline int mstmm_hinge_rates_by_speeds_by(void (*kernel)(void), struct ms
 }
 #define mstmm_hinge_rates_by_speeds(kernel, ...) mstmm_hinge_rates_by_speeds_by(kernel, (struct mstmm_hinge_rates_by_speeds){__VA_ARGS__})
 
-struct mstmm_hinge_forward_kept {
+struct mstmm_hinge_body_motion {
     const real *p;
     const real *q;
     const real *u;
@@ -4060,18 +4060,18 @@ struct mstmm_hinge_forward_kept {
     real *r;
     real *motion;
 };
-typedef int mstmm_hinge_forward_kept_kernel(
+typedef int mstmm_hinge_body_motion_kernel(
     const real *restrict, const real *restrict, const real *restrict, const real *restrict,
     const real *restrict, const real *restrict, const real *restrict, real *restrict,
     real *restrict, real *restrict, real *restrict, real *restrict, real *restrict,
     real *restrict, real *restrict, real *restrict, real *restrict);
-static inline int mstmm_hinge_forward_kept_by(void (*kernel)(void), struct mstmm_hinge_forward_kept to)
+static inline int mstmm_hinge_body_motion_by(void (*kernel)(void), struct mstmm_hinge_body_motion to)
 {
-    return ((mstmm_hinge_forward_kept_kernel *)kernel)(
+    return ((mstmm_hinge_body_motion_kernel *)kernel)(
         to.p, to.q, to.u, to.Rt, to.ro, to.s, to.motion_I, to.R, to.d, to.H, to.v, to.w, to.c,
         to.qdot, to.Rc, to.r, to.motion);
 }
-#define mstmm_hinge_forward_kept(kernel, ...) mstmm_hinge_forward_kept_by(kernel, (struct mstmm_hinge_forward_kept){__VA_ARGS__})
+#define mstmm_hinge_body_motion(kernel, ...) mstmm_hinge_body_motion_by(kernel, (struct mstmm_hinge_body_motion){__VA_ARGS__})
 
 struct mstmm_hinge_directions {
     const real *p;

@@ -31,7 +31,7 @@
 #define MSTMM_BLOCK_PER_SPEED 22
 /* Flexible bodies and sections: arrays after a number of values per mode. */
 #define MSTMM_MODES_S_RF_PER_MODE 0
-#define MSTMM_MODES_BASED_PER_MODE 6
+#define MSTMM_MODES_S_RF_I_PER_MODE 6
 #define MSTMM_MODES_A_PER_MODE 12
 #define MSTMM_MODES_RIGHT_PER_MODE 18
 #define MSTMM_MODES_GAIN_PER_MODE 25
@@ -55,14 +55,14 @@
 #define MSTMM_COUPLING_DRIFT 0
 #define MSTMM_COUPLING_GAP 1
 #define MSTMM_COUPLING_SLIP 2
-#define MSTMM_COUPLING_STILL 3
+#define MSTMM_COUPLING_TIME_RATE 3
 #define MSTMM_COUPLING 4
 #define MSTMM_ROW_K 0
 #define MSTMM_ROW_KNOWN 6
 #define MSTMM_ROW_PIVOT 7
 #define MSTMM_ROW_INVERSE 8
 #define MSTMM_ROW_X 9
-#define MSTMM_ROW_TOLD 10
+#define MSTMM_ROW_PREVIOUS_X 10
 #define MSTMM_ROW 11
 /* A body in a plane, and the values of its record. */
 #define MSTMM_FLAT_A 0
@@ -88,7 +88,7 @@
 
 /* Arrays of a flexible body of n modes, and of one of its sections. */
 #define MSTMM_MODES_S_RF(n) (0 * (size_t)(n) + 0 * (size_t)(n) * (n))
-#define MSTMM_MODES_BASED(n) (6 * (size_t)(n) + 0 * (size_t)(n) * (n))
+#define MSTMM_MODES_S_RF_I(n) (6 * (size_t)(n) + 0 * (size_t)(n) * (n))
 #define MSTMM_MODES_A(n) (12 * (size_t)(n) + 0 * (size_t)(n) * (n))
 #define MSTMM_MODES_RIGHT(n) (18 * (size_t)(n) + 0 * (size_t)(n) * (n))
 #define MSTMM_MODES_GAIN(n) (25 * (size_t)(n) + 0 * (size_t)(n) * (n))
@@ -120,12 +120,12 @@
 #define MSTMM_TANGENT_Y(nu, nq) (54 * 1 + 36 * (nu) + 3 * (nu) * (nu))
 #define MSTMM_TANGENT_KNOWN(nu, nq) (54 * 1 + 37 * (nu) + 3 * (nu) * (nu))
 #define MSTMM_TANGENT_ALONG(nu, nq) (63 * 1 + 37 * (nu) + 3 * (nu) * (nu))
-#define MSTMM_TANGENT_WAYS(nu, nq) (63 * 1 + 37 * (nu) + 3 * (nu) * (nu) + 1 * (nq) * (nu))
-#define MSTMM_TANGENT_TURNS(nu, nq) (63 * 1 + 37 * (nu) + 3 * (nu) * (nu) + 2 * (nq) * (nu))
+#define MSTMM_TANGENT_RATES_BY_SPEEDS(nu, nq) (63 * 1 + 37 * (nu) + 3 * (nu) * (nu) + 1 * (nq) * (nu))
+#define MSTMM_TANGENT_RATES_BY_COORDINATES(nu, nq) (63 * 1 + 37 * (nu) + 3 * (nu) * (nu) + 2 * (nq) * (nu))
 #define MSTMM_TANGENT_UNIT(nu, nq) (63 * 1 + 37 * (nu) + 3 * (nu) * (nu) + 1 * (nq) * (nq) + 2 * (nq) * (nu))
 #define MSTMM_TANGENT_RATES(nu, nq) (63 * 1 + 37 * (nu) + 3 * (nu) * (nu) + 2 * (nq) * (nq) + 2 * (nq) * (nu))
-#define MSTMM_TANGENT_LAG(nu, nq) (63 * 1 + 37 * (nu) + 3 * (nu) * (nu) + 3 * (nq) * (nq) + 2 * (nq) * (nu))
-#define MSTMM_TANGENT_LAG_WORK(nu, nq) (63 * 1 + 37 * (nu) + 3 * (nu) * (nu) + 4 * (nq) * (nq) + 2 * (nq) * (nu))
+#define MSTMM_TANGENT_Q(nu, nq) (63 * 1 + 37 * (nu) + 3 * (nu) * (nu) + 3 * (nq) * (nq) + 2 * (nq) * (nu))
+#define MSTMM_TANGENT_Q_WORK(nu, nq) (63 * 1 + 37 * (nu) + 3 * (nu) * (nu) + 4 * (nq) * (nq) + 2 * (nq) * (nu))
 #define MSTMM_TANGENT_NUMBERS(nu, nq) (63 * 1 + 37 * (nu) + 3 * (nu) * (nu) + 5 * (nq) * (nq) + 2 * (nq) * (nu))
 #define MSTMM_PLACE_S(nu, nq) (0)
 #define MSTMM_PLACE_Z(nu, nq) (54 * 1)
@@ -136,7 +136,7 @@
 #define MSTMM_BEND_B(n) (0 * (size_t)(n) + 0 * (size_t)(n) * (n))
 #define MSTMM_BEND_G(n) (9 * (size_t)(n) + 0 * (size_t)(n) * (n))
 #define MSTMM_BEND_W(n) (15 * (size_t)(n) + 0 * (size_t)(n) * (n))
-#define MSTMM_BEND_STILL(n) (15 * (size_t)(n) + 1 * (size_t)(n) * (n))
+#define MSTMM_BEND_ZERO_H(n) (15 * (size_t)(n) + 1 * (size_t)(n) * (n))
 #define MSTMM_BEND_K(n) (21 * (size_t)(n) + 1 * (size_t)(n) * (n))
 #define MSTMM_BEND_Z_Z(n) (27 * (size_t)(n) + 1 * (size_t)(n) * (n))
 #define MSTMM_BEND_Z_X(n) (36 * (size_t)(n) + 1 * (size_t)(n) * (n))

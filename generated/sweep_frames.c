@@ -16,13 +16,13 @@ int mstmm_sweep_frames_velocity(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_frames_point(const real *restrict A, const real *restrict x, const real *restrict v,
     const real *restrict motion, const real *restrict delta, const real *restrict offset,
     const real *restrict gravity, real *restrict x_K, real *restrict v_K, real *restrict a_K);
-int mstmm_sweep_frames_turning(const real *restrict A, const real *restrict motion,
+int mstmm_sweep_frames_angular_motion(const real *restrict A, const real *restrict motion,
     const real *restrict delta, real *restrict w_K, real *restrict alpha_K);
 int mstmm_sweep_frames_end_frame(const real *restrict A, const real *restrict R_end,
     real *restrict A_end);
 int mstmm_sweep_frames_applied_load(const real *restrict A, const real *restrict A_F,
     const real *restrict offset, const real *restrict F, const real *restrict M, real *restrict e);
-int mstmm_sweep_frames_opposite(const real *restrict x_F, const real *restrict x_T,
+int mstmm_sweep_frames_reaction_wrench(const real *restrict x_F, const real *restrict x_T,
     const real *restrict F, const real *restrict M, real *restrict F_back, real *restrict M_back);
 int mstmm_sweep_frames_power(const real *restrict A_F, const real *restrict F,
     const real *restrict M, const real *restrict v_K, const real *restrict w_K, real *restrict P);
@@ -37,19 +37,20 @@ int mstmm_sweep_frames_pivot_floor(const real *restrict S, real *restrict floor_
 int mstmm_sweep_frames_reaction(const real *restrict S, const real *restrict e,
     const real *restrict delta, const real *restrict A, real *restrict f, real *restrict force,
     real *restrict moment);
-int mstmm_sweep_frames_moment_at(const real *restrict A, const real *restrict offset,
+int mstmm_sweep_frames_moment_about(const real *restrict A, const real *restrict offset,
     const real *restrict f, real *restrict moment);
 int mstmm_sweep_frames_transport(const real *restrict Rc, const real *restrict r,
     const real *restrict e, real *restrict e_I);
 int mstmm_sweep_frames_rotor_energy(const real *restrict J, const real *restrict u,
     real *restrict T);
-int mstmm_sweep_frames_driven_effort(const real *restrict felt, const real *restrict J,
+int mstmm_sweep_frames_driven_effort(const real *restrict load, const real *restrict J,
     const real *restrict udot, const real *restrict tau, real *restrict tau_d);
 int mstmm_sweep_frames_speed_power(const real *restrict tau, const real *restrict u,
     real *restrict P);
 int mstmm_sweep_frames_length(const real *restrict x_F, const real *restrict v_F,
     const real *restrict x_T, const real *restrict v_T, real *restrict l);
-int mstmm_sweep_frames_turned(const real *restrict A, const real *restrict b, real *restrict b_0);
+int mstmm_sweep_frames_to_inertial(const real *restrict A, const real *restrict b,
+    real *restrict b_0);
 int mstmm_sweep_frames_classical_body(const real *restrict A, const real *restrict p,
     const real *restrict motion, const real *restrict load, const real *restrict ro_n,
     real *restrict M, real *restrict r_IO, real *restrict r_IC, real *restrict J_I,
@@ -59,14 +60,14 @@ int mstmm_sweep_frames_state_deviation(const real *restrict A, const real *restr
 int mstmm_sweep_frames_tangent_carry(const real *restrict Rc, const real *restrict r,
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict S, real *restrict T, real *restrict S_I);
-int mstmm_sweep_frames_tangent_moved(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_frames_tangent_motion(const real *restrict Rc, const real *restrict r,
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, real *restrict z);
-int mstmm_sweep_frames_tangent_turned(const real *restrict R, const real *restrict d_R,
+int mstmm_sweep_frames_tangent_pose_change(const real *restrict R, const real *restrict d_R,
     const real *restrict d_d, real *restrict theta, real *restrict x);
-int mstmm_sweep_frames_tangent_known(const real *restrict S, const real *restrict b,
+int mstmm_sweep_frames_tangent_known_load(const real *restrict S, const real *restrict b,
     const real *restrict g, real *restrict e_S, real *restrict e_b);
-int mstmm_sweep_frames_placed_moved(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_frames_placed_displacement(const real *restrict Rc, const real *restrict r,
     const real *restrict z_I, const real *restrict p_I, real *restrict p);
 int mstmm_sweep_frames_placed_pose(const real *restrict A, const real *restrict p,
     real *restrict d_A, real *restrict d_x, real *restrict d_v);
@@ -76,7 +77,7 @@ int mstmm_sweep_frames_placed_column(const real *restrict theta, const real *res
 int mstmm_sweep_frames_placed_carry(const real *restrict Rc, const real *restrict r,
     const real *restrict S_p, real *restrict T_p, real *restrict T_w, real *restrict S_pI,
     real *restrict S_wI);
-int mstmm_sweep_frames_placed_known(const real *restrict S_p, const real *restrict b_p,
+int mstmm_sweep_frames_placed_known_load(const real *restrict S_p, const real *restrict b_p,
     real *restrict e_S, real *restrict e_b);
 int mstmm_sweep_frames_pose_slope(const real *restrict A_I, const real *restrict x_I,
     const real *restrict Rc, const real *restrict r, const real *restrict d_A_I,
@@ -91,7 +92,7 @@ int mstmm_sweep_frames_point_slope(const real *restrict A, const real *restrict 
     const real *restrict offset, const real *restrict gravity, const real *restrict d_A,
     const real *restrict d_x, const real *restrict d_v, const real *restrict d_motion,
     real *restrict d_x_K, real *restrict d_v_K);
-int mstmm_sweep_frames_turning_slope(const real *restrict A, const real *restrict motion,
+int mstmm_sweep_frames_angular_motion_slope(const real *restrict A, const real *restrict motion,
     const real *restrict delta, const real *restrict d_A, const real *restrict d_motion,
     real *restrict d_w_K);
 int mstmm_sweep_frames_end_frame_slope(const real *restrict A, const real *restrict R_end,
@@ -100,15 +101,15 @@ int mstmm_sweep_frames_applied_load_slope(const real *restrict A, const real *re
     const real *restrict offset, const real *restrict F, const real *restrict M,
     const real *restrict d_A, const real *restrict d_A_F, const real *restrict d_F,
     const real *restrict d_M, real *restrict d_e);
-int mstmm_sweep_frames_opposite_slope(const real *restrict x_F, const real *restrict x_T,
+int mstmm_sweep_frames_reaction_wrench_slope(const real *restrict x_F, const real *restrict x_T,
     const real *restrict F, const real *restrict M, const real *restrict d_x_F,
     const real *restrict d_x_T, const real *restrict d_F, const real *restrict d_M,
     real *restrict d_F_back, real *restrict d_M_back);
 int mstmm_sweep_frames_transport_slope(const real *restrict Rc, const real *restrict r,
     const real *restrict e, const real *restrict d_Rc, const real *restrict d_r,
     const real *restrict d_e, real *restrict d_e_I);
-int mstmm_sweep_frames_driven_effort_slope(const real *restrict felt, const real *restrict J,
-    const real *restrict udot, const real *restrict tau, const real *restrict d_felt,
+int mstmm_sweep_frames_driven_effort_slope(const real *restrict load, const real *restrict J,
+    const real *restrict udot, const real *restrict tau, const real *restrict d_load,
     const real *restrict d_udot, const real *restrict d_tau, real *restrict d_tau_d);
 int mstmm_sweep_frames_length_slope(const real *restrict x_F, const real *restrict v_F,
     const real *restrict x_T, const real *restrict v_T, const real *restrict d_x_F,
@@ -470,7 +471,7 @@ static const mstmm_port mstmm_sweep_frames_point_outputs[] = {
  * out w_K[3] (rad/s) angular velocity, inertial axes
  * out alpha_K[3] (rad/s2) angular acceleration, inertial axes
  */
-int mstmm_sweep_frames_turning(const real *restrict A, const real *restrict motion,
+int mstmm_sweep_frames_angular_motion(const real *restrict A, const real *restrict motion,
     const real *restrict delta, real *restrict w_K, real *restrict alpha_K)
 {
     const real t0 = A[0] * motion[0];
@@ -515,19 +516,19 @@ int mstmm_sweep_frames_turning(const real *restrict A, const real *restrict moti
     return 0;
 }
 
-static int mstmm_sweep_frames_turning_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_frames_angular_motion_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_frames_turning(in[0], in[1], in[2], out[0], out[1]);
+    return mstmm_sweep_frames_angular_motion(in[0], in[1], in[2], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_frames_turning_inputs[] = {
+static const mstmm_port mstmm_sweep_frames_angular_motion_inputs[] = {
     {"A", 9, "", 0, 0},
     {"motion", 9, "", 0, 0},
     {"delta", 6, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_frames_turning_outputs[] = {
+static const mstmm_port mstmm_sweep_frames_angular_motion_outputs[] = {
     {"w_K", 3, "rad/s", 0, 0},
     {"alpha_K", 3, "rad/s2", 0, 0},
 };
@@ -748,7 +749,7 @@ static const mstmm_port mstmm_sweep_frames_applied_load_outputs[] = {
  * out F_back[3] (N) force on F
  * out M_back[3] (N*m) moment on F
  */
-int mstmm_sweep_frames_opposite(const real *restrict x_F, const real *restrict x_T,
+int mstmm_sweep_frames_reaction_wrench(const real *restrict x_F, const real *restrict x_T,
     const real *restrict F, const real *restrict M, real *restrict F_back, real *restrict M_back)
 {
     const real t0 = -F[0];
@@ -779,20 +780,20 @@ int mstmm_sweep_frames_opposite(const real *restrict x_F, const real *restrict x
     return 0;
 }
 
-static int mstmm_sweep_frames_opposite_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_frames_reaction_wrench_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_frames_opposite(in[0], in[1], in[2], in[3], out[0], out[1]);
+    return mstmm_sweep_frames_reaction_wrench(in[0], in[1], in[2], in[3], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_frames_opposite_inputs[] = {
+static const mstmm_port mstmm_sweep_frames_reaction_wrench_inputs[] = {
     {"x_F", 3, "", 0, 0},
     {"x_T", 3, "", 0, 0},
     {"F", 3, "", 0, 0},
     {"M", 3, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_frames_opposite_outputs[] = {
+static const mstmm_port mstmm_sweep_frames_reaction_wrench_outputs[] = {
     {"F_back", 3, "N", 0, 0},
     {"M_back", 3, "N*m", 0, 0},
 };
@@ -1375,7 +1376,7 @@ static const mstmm_port mstmm_sweep_frames_reaction_outputs[] = {
  * in  f[6] (N, N*m) load at P, body axes
  * out moment[3] (N*m) about the point, inertial axes
  */
-int mstmm_sweep_frames_moment_at(const real *restrict A, const real *restrict offset,
+int mstmm_sweep_frames_moment_about(const real *restrict A, const real *restrict offset,
     const real *restrict f, real *restrict moment)
 {
     const real t0 = offset[2] * f[1];
@@ -1411,19 +1412,19 @@ int mstmm_sweep_frames_moment_at(const real *restrict A, const real *restrict of
     return 0;
 }
 
-static int mstmm_sweep_frames_moment_at_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_frames_moment_about_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_frames_moment_at(in[0], in[1], in[2], out[0]);
+    return mstmm_sweep_frames_moment_about(in[0], in[1], in[2], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_frames_moment_at_inputs[] = {
+static const mstmm_port mstmm_sweep_frames_moment_about_inputs[] = {
     {"A", 9, "", 0, 0},
     {"offset", 3, "m", 0, 0},
     {"f", 6, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_frames_moment_at_outputs[] = {
+static const mstmm_port mstmm_sweep_frames_moment_about_outputs[] = {
     {"moment", 3, "N*m", 0, 0},
 };
 
@@ -1534,18 +1535,18 @@ static const mstmm_port mstmm_sweep_frames_rotor_energy_outputs[] = {
 };
 
 /* effort required by a prescribed acceleration
- * in  felt[1] (N, N*m) effort along the speed of the load at P, H^T f
+ * in  load[1] (N, N*m) effort along the speed of the load at P, H^T f
  * in  J[1] (kg or kg*m2) rotor inertia reflected to the speed
  * in  udot[1] acceleration
  * in  tau[1] (N, N*m) effort already applied
  * out tau_d[1] (N, N*m) missing effort
  */
-int mstmm_sweep_frames_driven_effort(const real *restrict felt, const real *restrict J,
+int mstmm_sweep_frames_driven_effort(const real *restrict load, const real *restrict J,
     const real *restrict udot, const real *restrict tau, real *restrict tau_d)
 {
     const real t0 = J[0] * udot[0];
     const real t1 = t0 - tau[0];
-    const real t2 = felt[0] + t1;
+    const real t2 = load[0] + t1;
     tau_d[0] = t2;
     return 0;
 }
@@ -1557,7 +1558,7 @@ static int mstmm_sweep_frames_driven_effort_call(int n, const real *const *in, r
 }
 
 static const mstmm_port mstmm_sweep_frames_driven_effort_inputs[] = {
-    {"felt", 1, "N, N*m", 0, 0},
+    {"load", 1, "N, N*m", 0, 0},
     {"J", 1, "kg or kg*m2", 0, 0},
     {"udot", 1, "", 0, 0},
     {"tau", 1, "N, N*m", 0, 0},
@@ -1651,7 +1652,8 @@ static const mstmm_port mstmm_sweep_frames_length_outputs[] = {
  * in  b[3] body axes
  * out b_0[3] inertial axes
  */
-int mstmm_sweep_frames_turned(const real *restrict A, const real *restrict b, real *restrict b_0)
+int mstmm_sweep_frames_to_inertial(const real *restrict A, const real *restrict b,
+    real *restrict b_0)
 {
     const real t0 = A[0] * b[0];
     const real t1 = A[1] * b[1];
@@ -1674,18 +1676,18 @@ int mstmm_sweep_frames_turned(const real *restrict A, const real *restrict b, re
     return 0;
 }
 
-static int mstmm_sweep_frames_turned_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_frames_to_inertial_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_frames_turned(in[0], in[1], out[0]);
+    return mstmm_sweep_frames_to_inertial(in[0], in[1], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_frames_turned_inputs[] = {
+static const mstmm_port mstmm_sweep_frames_to_inertial_inputs[] = {
     {"A", 9, "", 0, 0},
     {"b", 3, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_frames_turned_outputs[] = {
+static const mstmm_port mstmm_sweep_frames_to_inertial_outputs[] = {
     {"b_0", 3, "", 0, 0},
 };
 
@@ -2009,7 +2011,7 @@ static const mstmm_port mstmm_sweep_frames_state_deviation_outputs[] = {
  * in  w[3] (rad/s) relative angular velocity of the hinge, body axes
  * in  S[9][6] change of the load by that of the motion, one row per entry
  * out T[9][6] S Th, one row per entry
- * out S_I[9][6] that of the parent, added to what is there
+ * out S_I[9][6] S of the parent, added to what is there
  */
 int mstmm_sweep_frames_tangent_carry(const real *restrict Rc, const real *restrict r,
     const real *restrict w_I, const real *restrict v, const real *restrict w,
@@ -2258,7 +2260,7 @@ static const mstmm_port mstmm_sweep_frames_tangent_carry_outputs[] = {
     {"S_I", 54, "", 1, 0},
 };
 
-/* change of a body's motion by that of its parent's
+/* change of a body's motion by that of its parent
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -2269,7 +2271,7 @@ static const mstmm_port mstmm_sweep_frames_tangent_carry_outputs[] = {
  * in  z_I[9] change of the parent's motion, parent axes
  * out z[9] change of the body's motion, own axes
  */
-int mstmm_sweep_frames_tangent_moved(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_frames_tangent_motion(const real *restrict Rc, const real *restrict r,
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, real *restrict z)
 {
@@ -2411,13 +2413,13 @@ int mstmm_sweep_frames_tangent_moved(const real *restrict Rc, const real *restri
     return 0;
 }
 
-static int mstmm_sweep_frames_tangent_moved_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_frames_tangent_motion_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_frames_tangent_moved(in[0], in[1], in[2], in[3], in[4], in[5], out[0]);
+    return mstmm_sweep_frames_tangent_motion(in[0], in[1], in[2], in[3], in[4], in[5], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_frames_tangent_moved_inputs[] = {
+static const mstmm_port mstmm_sweep_frames_tangent_motion_inputs[] = {
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"w_I", 3, "rad/s", 0, 0},
@@ -2426,7 +2428,7 @@ static const mstmm_port mstmm_sweep_frames_tangent_moved_inputs[] = {
     {"z_I", 9, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_frames_tangent_moved_outputs[] = {
+static const mstmm_port mstmm_sweep_frames_tangent_motion_outputs[] = {
     {"z", 9, "", 0, 0},
 };
 
@@ -2439,7 +2441,7 @@ static const mstmm_port mstmm_sweep_frames_tangent_moved_outputs[] = {
  * out theta[3] rotation of the body along the direction, body axes
  * out x[3] displacement of P along the direction, body axes
  */
-int mstmm_sweep_frames_tangent_turned(const real *restrict R, const real *restrict d_R,
+int mstmm_sweep_frames_tangent_pose_change(const real *restrict R, const real *restrict d_R,
     const real *restrict d_d, real *restrict theta, real *restrict x)
 {
     const real t0 = R[8] * d_R[7];
@@ -2481,19 +2483,19 @@ int mstmm_sweep_frames_tangent_turned(const real *restrict R, const real *restri
     return 0;
 }
 
-static int mstmm_sweep_frames_tangent_turned_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_frames_tangent_pose_change_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_frames_tangent_turned(in[0], in[1], in[2], out[0], out[1]);
+    return mstmm_sweep_frames_tangent_pose_change(in[0], in[1], in[2], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_frames_tangent_turned_inputs[] = {
+static const mstmm_port mstmm_sweep_frames_tangent_pose_change_inputs[] = {
     {"R", 9, "", 0, 0},
     {"d_R", 9, "", 0, 0},
     {"d_d", 3, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_frames_tangent_turned_outputs[] = {
+static const mstmm_port mstmm_sweep_frames_tangent_pose_change_outputs[] = {
     {"theta", 3, "", 0, 0},
     {"x", 3, "", 0, 0},
 };
@@ -2507,7 +2509,7 @@ static const mstmm_port mstmm_sweep_frames_tangent_turned_outputs[] = {
  * out e_S[6] (N, N*m) load due to the known motion
  * out e_b[6] (N, N*m) load due to known increments, without the unknowns
  */
-int mstmm_sweep_frames_tangent_known(const real *restrict S, const real *restrict b,
+int mstmm_sweep_frames_tangent_known_load(const real *restrict S, const real *restrict b,
     const real *restrict g, real *restrict e_S, real *restrict e_b)
 {
     for (int k = 0; k < 6; k += 2) {
@@ -2548,19 +2550,19 @@ int mstmm_sweep_frames_tangent_known(const real *restrict S, const real *restric
     return 0;
 }
 
-static int mstmm_sweep_frames_tangent_known_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_frames_tangent_known_load_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_frames_tangent_known(in[0], in[1], in[2], out[0], out[1]);
+    return mstmm_sweep_frames_tangent_known_load(in[0], in[1], in[2], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_frames_tangent_known_inputs[] = {
+static const mstmm_port mstmm_sweep_frames_tangent_known_load_inputs[] = {
     {"S", 54, "", 0, 0},
     {"b", 9, "", 0, 0},
     {"g", 6, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_frames_tangent_known_outputs[] = {
+static const mstmm_port mstmm_sweep_frames_tangent_known_load_outputs[] = {
     {"e_S", 6, "N, N*m", 0, 0},
     {"e_b", 6, "N, N*m", 0, 0},
 };
@@ -2574,7 +2576,7 @@ static const mstmm_port mstmm_sweep_frames_tangent_known_outputs[] = {
  * in  p_I[9] change of the parent's pose, parent axes
  * out p[9] change of pose: rotation, position and velocity of P, own axes
  */
-int mstmm_sweep_frames_placed_moved(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_frames_placed_displacement(const real *restrict Rc, const real *restrict r,
     const real *restrict z_I, const real *restrict p_I, real *restrict p)
 {
     const real t0 = Rc[0] * p_I[0];
@@ -2658,20 +2660,20 @@ int mstmm_sweep_frames_placed_moved(const real *restrict Rc, const real *restric
     return 0;
 }
 
-static int mstmm_sweep_frames_placed_moved_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_frames_placed_displacement_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_frames_placed_moved(in[0], in[1], in[2], in[3], out[0]);
+    return mstmm_sweep_frames_placed_displacement(in[0], in[1], in[2], in[3], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_frames_placed_moved_inputs[] = {
+static const mstmm_port mstmm_sweep_frames_placed_displacement_inputs[] = {
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"z_I", 9, "", 0, 0},
     {"p_I", 9, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_frames_placed_moved_outputs[] = {
+static const mstmm_port mstmm_sweep_frames_placed_displacement_outputs[] = {
     {"p", 9, "", 0, 0},
 };
 
@@ -2845,8 +2847,8 @@ static const mstmm_port mstmm_sweep_frames_placed_column_outputs[] = {
  * in  S_p[9][6] change of the load by the pose, one row per entry
  * out T_p[9][6] S_p Th_p, one row per entry
  * out T_w[3][6] S_p Th_z by angular velocity, added to what is there
- * out S_pI[9][6] that of the parent, added to what is there
- * out S_wI[3][6] the parent's S, of it that, added to what is there
+ * out S_pI[9][6] S_p of the parent, added to what is there
+ * out S_wI[3][6] S of the parent, by angular velocity, added to what is there
  */
 int mstmm_sweep_frames_placed_carry(const real *restrict Rc, const real *restrict r,
     const real *restrict S_p, real *restrict T_p, real *restrict T_w, real *restrict S_pI,
@@ -3924,9 +3926,9 @@ static const mstmm_port mstmm_sweep_frames_placed_carry_outputs[] = {
  * in  S_p[9][6] change of the load by the pose, one row per entry
  * in  b_p[9] known change of pose
  * out e_S[6] (N, N*m) load due to known increments, added to what is there
- * out e_b[6] (N, N*m) the same, as it is carried, added to what is there
+ * out e_b[6] (N, N*m) carried load due to known increments, added to what is there
  */
-int mstmm_sweep_frames_placed_known(const real *restrict S_p, const real *restrict b_p,
+int mstmm_sweep_frames_placed_known_load(const real *restrict S_p, const real *restrict b_p,
     real *restrict e_S, real *restrict e_b)
 {
     const real t0 = S_p[0] * b_p[0];
@@ -4046,18 +4048,18 @@ int mstmm_sweep_frames_placed_known(const real *restrict S_p, const real *restri
     return 0;
 }
 
-static int mstmm_sweep_frames_placed_known_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_frames_placed_known_load_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_frames_placed_known(in[0], in[1], out[0], out[1]);
+    return mstmm_sweep_frames_placed_known_load(in[0], in[1], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_frames_placed_known_inputs[] = {
+static const mstmm_port mstmm_sweep_frames_placed_known_load_inputs[] = {
     {"S_p", 54, "", 0, 0},
     {"b_p", 9, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_frames_placed_known_outputs[] = {
+static const mstmm_port mstmm_sweep_frames_placed_known_load_outputs[] = {
     {"e_S", 6, "N, N*m", 1, 0},
     {"e_b", 6, "N, N*m", 1, 0},
 };
@@ -4505,7 +4507,7 @@ static const mstmm_port mstmm_sweep_frames_point_slope_outputs[] = {
     {"d_v_K", 3, "m/s", 0, 0},
 };
 
-/* turning and its derivative along a direction
+/* angular_motion and its derivative along a direction
  * in  A[3][3] rotation, body axes to inertial axes
  * in  motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  * in  delta[6] deviation of the body's acceleration
@@ -4513,7 +4515,7 @@ static const mstmm_port mstmm_sweep_frames_point_slope_outputs[] = {
  * in  d_motion[9] derivative of motion
  * out d_w_K[3] (rad/s) derivative of w_K
  */
-int mstmm_sweep_frames_turning_slope(const real *restrict A, const real *restrict motion,
+int mstmm_sweep_frames_angular_motion_slope(const real *restrict A, const real *restrict motion,
     const real *restrict delta, const real *restrict d_A, const real *restrict d_motion,
     real *restrict d_w_K)
 {
@@ -4557,13 +4559,13 @@ int mstmm_sweep_frames_turning_slope(const real *restrict A, const real *restric
     return 0;
 }
 
-static int mstmm_sweep_frames_turning_slope_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_frames_angular_motion_slope_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_frames_turning_slope(in[0], in[1], in[2], in[3], in[4], out[0]);
+    return mstmm_sweep_frames_angular_motion_slope(in[0], in[1], in[2], in[3], in[4], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_frames_turning_slope_inputs[] = {
+static const mstmm_port mstmm_sweep_frames_angular_motion_slope_inputs[] = {
     {"A", 9, "", 0, 0},
     {"motion", 9, "", 0, 0},
     {"delta", 6, "", 0, 0},
@@ -4571,7 +4573,7 @@ static const mstmm_port mstmm_sweep_frames_turning_slope_inputs[] = {
     {"d_motion", 9, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_frames_turning_slope_outputs[] = {
+static const mstmm_port mstmm_sweep_frames_angular_motion_slope_outputs[] = {
     {"d_w_K", 3, "rad/s", 0, 0},
 };
 
@@ -4931,7 +4933,7 @@ static const mstmm_port mstmm_sweep_frames_applied_load_slope_outputs[] = {
     {"d_e", 6, "N, N*m", 1, 0},
 };
 
-/* opposite and its derivative along a direction
+/* reaction_wrench and its derivative along a direction
  * in  x_F[3]
  * in  x_T[3]
  * in  F[3]
@@ -4943,7 +4945,7 @@ static const mstmm_port mstmm_sweep_frames_applied_load_slope_outputs[] = {
  * out d_F_back[3] (N) derivative of F_back
  * out d_M_back[3] (N*m) derivative of M_back
  */
-int mstmm_sweep_frames_opposite_slope(const real *restrict x_F, const real *restrict x_T,
+int mstmm_sweep_frames_reaction_wrench_slope(const real *restrict x_F, const real *restrict x_T,
     const real *restrict F, const real *restrict M, const real *restrict d_x_F,
     const real *restrict d_x_T, const real *restrict d_F, const real *restrict d_M,
     real *restrict d_F_back, real *restrict d_M_back)
@@ -4992,13 +4994,13 @@ int mstmm_sweep_frames_opposite_slope(const real *restrict x_F, const real *rest
     return 0;
 }
 
-static int mstmm_sweep_frames_opposite_slope_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_frames_reaction_wrench_slope_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_frames_opposite_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1]);
+    return mstmm_sweep_frames_reaction_wrench_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_frames_opposite_slope_inputs[] = {
+static const mstmm_port mstmm_sweep_frames_reaction_wrench_slope_inputs[] = {
     {"x_F", 3, "", 0, 0},
     {"x_T", 3, "", 0, 0},
     {"F", 3, "", 0, 0},
@@ -5009,7 +5011,7 @@ static const mstmm_port mstmm_sweep_frames_opposite_slope_inputs[] = {
     {"d_M", 3, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_frames_opposite_slope_outputs[] = {
+static const mstmm_port mstmm_sweep_frames_reaction_wrench_slope_outputs[] = {
     {"d_F_back", 3, "N", 0, 0},
     {"d_M_back", 3, "N*m", 0, 0},
 };
@@ -5161,25 +5163,25 @@ static const mstmm_port mstmm_sweep_frames_transport_slope_outputs[] = {
 };
 
 /* driven_effort and its derivative along a direction
- * in  felt[1] (N, N*m) effort along the speed of the load at P, H^T f
+ * in  load[1] (N, N*m) effort along the speed of the load at P, H^T f
  * in  J[1] (kg or kg*m2) rotor inertia reflected to the speed
  * in  udot[1] acceleration
  * in  tau[1] (N, N*m) effort already applied
- * in  d_felt[1] (N, N*m) derivative of felt
+ * in  d_load[1] (N, N*m) derivative of load
  * in  d_udot[1] derivative of udot
  * in  d_tau[1] (N, N*m) derivative of tau
  * out d_tau_d[1] (N, N*m) derivative of tau_d
  */
-int mstmm_sweep_frames_driven_effort_slope(const real *restrict felt, const real *restrict J,
-    const real *restrict udot, const real *restrict tau, const real *restrict d_felt,
+int mstmm_sweep_frames_driven_effort_slope(const real *restrict load, const real *restrict J,
+    const real *restrict udot, const real *restrict tau, const real *restrict d_load,
     const real *restrict d_udot, const real *restrict d_tau, real *restrict d_tau_d)
 {
-    (void)felt;
+    (void)load;
     (void)udot;
     (void)tau;
     const real t0 = J[0] * d_udot[0];
     const real t1 = t0 - d_tau[0];
-    const real t2 = d_felt[0] + t1;
+    const real t2 = d_load[0] + t1;
     d_tau_d[0] = t2;
     return 0;
 }
@@ -5191,11 +5193,11 @@ static int mstmm_sweep_frames_driven_effort_slope_call(int n, const real *const 
 }
 
 static const mstmm_port mstmm_sweep_frames_driven_effort_slope_inputs[] = {
-    {"felt", 1, "N, N*m", 0, 0},
+    {"load", 1, "N, N*m", 0, 0},
     {"J", 1, "kg or kg*m2", 0, 0},
     {"udot", 1, "", 0, 0},
     {"tau", 1, "N, N*m", 0, 0},
-    {"d_felt", 1, "N, N*m", 0, 0},
+    {"d_load", 1, "N, N*m", 0, 0},
     {"d_udot", 1, "", 0, 0},
     {"d_tau", 1, "N, N*m", 0, 0},
 };
@@ -5334,14 +5336,14 @@ static const mstmm_kernel mstmm_sweep_frames_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "turning",
-        .function = (void (*)(void))mstmm_sweep_frames_turning,
-        .call = mstmm_sweep_frames_turning_call,
+        .name = "angular_motion",
+        .function = (void (*)(void))mstmm_sweep_frames_angular_motion,
+        .call = mstmm_sweep_frames_angular_motion_call,
         .n_inputs = 3,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_frames_turning_inputs,
-        .outputs = mstmm_sweep_frames_turning_outputs,
-        .ir_hash = "1dbee9027863da13753f8a77706451c1227545ce3b03bc0236c2d1f15af5a991",
+        .inputs = mstmm_sweep_frames_angular_motion_inputs,
+        .outputs = mstmm_sweep_frames_angular_motion_outputs,
+        .ir_hash = "0250706f499fe7d4f654d599df312e1443a39b8b417f1582880d9bdc2d819e58",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5370,14 +5372,14 @@ static const mstmm_kernel mstmm_sweep_frames_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "opposite",
-        .function = (void (*)(void))mstmm_sweep_frames_opposite,
-        .call = mstmm_sweep_frames_opposite_call,
+        .name = "reaction_wrench",
+        .function = (void (*)(void))mstmm_sweep_frames_reaction_wrench,
+        .call = mstmm_sweep_frames_reaction_wrench_call,
         .n_inputs = 4,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_frames_opposite_inputs,
-        .outputs = mstmm_sweep_frames_opposite_outputs,
-        .ir_hash = "fb1b245f8b62804b5a1022e4953604018a4cdc7de42e1b5c28613e1ed613b067",
+        .inputs = mstmm_sweep_frames_reaction_wrench_inputs,
+        .outputs = mstmm_sweep_frames_reaction_wrench_outputs,
+        .ir_hash = "a1b94378833cc02524146d1b677e3faf612fec131e370bb067db23f2ddfbc065",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5454,14 +5456,14 @@ static const mstmm_kernel mstmm_sweep_frames_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "moment_at",
-        .function = (void (*)(void))mstmm_sweep_frames_moment_at,
-        .call = mstmm_sweep_frames_moment_at_call,
+        .name = "moment_about",
+        .function = (void (*)(void))mstmm_sweep_frames_moment_about,
+        .call = mstmm_sweep_frames_moment_about_call,
         .n_inputs = 3,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_frames_moment_at_inputs,
-        .outputs = mstmm_sweep_frames_moment_at_outputs,
-        .ir_hash = "51f6f53bbb6e700a6c5fabba521581c9f92d11bedef18f10334d05b0b9d768b9",
+        .inputs = mstmm_sweep_frames_moment_about_inputs,
+        .outputs = mstmm_sweep_frames_moment_about_outputs,
+        .ir_hash = "da8fba9ec31e864f34c34c7e132fb3de5f243fde1fe4f8d061ec97f505d671ab",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5497,7 +5499,7 @@ static const mstmm_kernel mstmm_sweep_frames_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_frames_driven_effort_inputs,
         .outputs = mstmm_sweep_frames_driven_effort_outputs,
-        .ir_hash = "0d600317b607c6628becca97d9373b507be6182b9c78322d260d4d6b82cddbb9",
+        .ir_hash = "68eb1f27d2d6f50c80268769a96d84a7e8cd60e009d35272130427be53247635",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5526,14 +5528,14 @@ static const mstmm_kernel mstmm_sweep_frames_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "turned",
-        .function = (void (*)(void))mstmm_sweep_frames_turned,
-        .call = mstmm_sweep_frames_turned_call,
+        .name = "to_inertial",
+        .function = (void (*)(void))mstmm_sweep_frames_to_inertial,
+        .call = mstmm_sweep_frames_to_inertial_call,
         .n_inputs = 2,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_frames_turned_inputs,
-        .outputs = mstmm_sweep_frames_turned_outputs,
-        .ir_hash = "91b284cec3555bea70e1b171449767df3fa83896ea7efbea2188e1f5fc8fb8ae",
+        .inputs = mstmm_sweep_frames_to_inertial_inputs,
+        .outputs = mstmm_sweep_frames_to_inertial_outputs,
+        .ir_hash = "018a59b07f0ceaa91481dc3b1e14e7e30ebfa51e93e8c3e6dc99c98bc1d267b7",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5569,55 +5571,55 @@ static const mstmm_kernel mstmm_sweep_frames_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_frames_tangent_carry_inputs,
         .outputs = mstmm_sweep_frames_tangent_carry_outputs,
-        .ir_hash = "3c958215d8c9c499a65d06199c4afe860c2b09a5b4b5bb06bf1c8026ab76b208",
+        .ir_hash = "9af23a4f702b6beb85cf6baaece9ccedf424251d8e5baa2237cdda9c253d4259",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "tangent_moved",
-        .function = (void (*)(void))mstmm_sweep_frames_tangent_moved,
-        .call = mstmm_sweep_frames_tangent_moved_call,
+        .name = "tangent_motion",
+        .function = (void (*)(void))mstmm_sweep_frames_tangent_motion,
+        .call = mstmm_sweep_frames_tangent_motion_call,
         .n_inputs = 6,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_frames_tangent_moved_inputs,
-        .outputs = mstmm_sweep_frames_tangent_moved_outputs,
-        .ir_hash = "e1a160196e3d015b3373708d78e4c4f2b37bc4aaf9f0f99078d7c46dcc59ef92",
+        .inputs = mstmm_sweep_frames_tangent_motion_inputs,
+        .outputs = mstmm_sweep_frames_tangent_motion_outputs,
+        .ir_hash = "7b01799fd504547335d56db387b52a513f1ec2194c97dd4505d1d0ba090acfc6",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "tangent_turned",
-        .function = (void (*)(void))mstmm_sweep_frames_tangent_turned,
-        .call = mstmm_sweep_frames_tangent_turned_call,
+        .name = "tangent_pose_change",
+        .function = (void (*)(void))mstmm_sweep_frames_tangent_pose_change,
+        .call = mstmm_sweep_frames_tangent_pose_change_call,
         .n_inputs = 3,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_frames_tangent_turned_inputs,
-        .outputs = mstmm_sweep_frames_tangent_turned_outputs,
-        .ir_hash = "18e29affd54e083febe0792a094ea8cf90a5876a9d4c4832ced74d357a310dca",
+        .inputs = mstmm_sweep_frames_tangent_pose_change_inputs,
+        .outputs = mstmm_sweep_frames_tangent_pose_change_outputs,
+        .ir_hash = "c485cc7188f09546bd4cc16b74cea7324ca25f972ac444efaf35a8735f8680e4",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "tangent_known",
-        .function = (void (*)(void))mstmm_sweep_frames_tangent_known,
-        .call = mstmm_sweep_frames_tangent_known_call,
+        .name = "tangent_known_load",
+        .function = (void (*)(void))mstmm_sweep_frames_tangent_known_load,
+        .call = mstmm_sweep_frames_tangent_known_load_call,
         .n_inputs = 3,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_frames_tangent_known_inputs,
-        .outputs = mstmm_sweep_frames_tangent_known_outputs,
-        .ir_hash = "e38fc718df6320daf70039382e7538593187fff779ab28b21f2d78bb5be46419",
+        .inputs = mstmm_sweep_frames_tangent_known_load_inputs,
+        .outputs = mstmm_sweep_frames_tangent_known_load_outputs,
+        .ir_hash = "525a71eda97a6c2e27fe1a25870b20224b900d8dbfbf716632cb6547d825a2cc",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "placed_moved",
-        .function = (void (*)(void))mstmm_sweep_frames_placed_moved,
-        .call = mstmm_sweep_frames_placed_moved_call,
+        .name = "placed_displacement",
+        .function = (void (*)(void))mstmm_sweep_frames_placed_displacement,
+        .call = mstmm_sweep_frames_placed_displacement_call,
         .n_inputs = 4,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_frames_placed_moved_inputs,
-        .outputs = mstmm_sweep_frames_placed_moved_outputs,
-        .ir_hash = "225e361fb1d82b080246ea3adcaa6f819f3649a795c1b715ffda80d9b4b85472",
+        .inputs = mstmm_sweep_frames_placed_displacement_inputs,
+        .outputs = mstmm_sweep_frames_placed_displacement_outputs,
+        .ir_hash = "a545bc94b4b02ab7c10495f2005930b0e2d6e2ec3474020cb8ba0dd166ab3d20",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5653,19 +5655,19 @@ static const mstmm_kernel mstmm_sweep_frames_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_sweep_frames_placed_carry_inputs,
         .outputs = mstmm_sweep_frames_placed_carry_outputs,
-        .ir_hash = "83c70cd585cb5fbf4b7d1eb64596b372e4b96be403fe823cf98df6831b5ac7b4",
+        .ir_hash = "4234ac3870588bdb8d8c34002519f522b7cdeffe10be1d789078fcf488043ae0",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "placed_known",
-        .function = (void (*)(void))mstmm_sweep_frames_placed_known,
-        .call = mstmm_sweep_frames_placed_known_call,
+        .name = "placed_known_load",
+        .function = (void (*)(void))mstmm_sweep_frames_placed_known_load,
+        .call = mstmm_sweep_frames_placed_known_load_call,
         .n_inputs = 2,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_frames_placed_known_inputs,
-        .outputs = mstmm_sweep_frames_placed_known_outputs,
-        .ir_hash = "4255bcec45dd9ba73fe8052e01523398113f68ad7d21fff5143067bbdef11234",
+        .inputs = mstmm_sweep_frames_placed_known_load_inputs,
+        .outputs = mstmm_sweep_frames_placed_known_load_outputs,
+        .ir_hash = "b21dae1bdfdd35b2e33b9acdafcc824a5904c68d35691d1e25827792b2362fab",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5706,14 +5708,14 @@ static const mstmm_kernel mstmm_sweep_frames_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "turning_slope",
-        .function = (void (*)(void))mstmm_sweep_frames_turning_slope,
-        .call = mstmm_sweep_frames_turning_slope_call,
+        .name = "angular_motion_slope",
+        .function = (void (*)(void))mstmm_sweep_frames_angular_motion_slope,
+        .call = mstmm_sweep_frames_angular_motion_slope_call,
         .n_inputs = 5,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_frames_turning_slope_inputs,
-        .outputs = mstmm_sweep_frames_turning_slope_outputs,
-        .ir_hash = "72a06532a5be48f11bbc22506a3e65ced486a18206aa8477177642c5cbe9f4ef",
+        .inputs = mstmm_sweep_frames_angular_motion_slope_inputs,
+        .outputs = mstmm_sweep_frames_angular_motion_slope_outputs,
+        .ir_hash = "a91f6dcee4b06ced7fe979f82c57505d04612ed5e073b3a619c666654eb27348",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5742,14 +5744,14 @@ static const mstmm_kernel mstmm_sweep_frames_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "opposite_slope",
-        .function = (void (*)(void))mstmm_sweep_frames_opposite_slope,
-        .call = mstmm_sweep_frames_opposite_slope_call,
+        .name = "reaction_wrench_slope",
+        .function = (void (*)(void))mstmm_sweep_frames_reaction_wrench_slope,
+        .call = mstmm_sweep_frames_reaction_wrench_slope_call,
         .n_inputs = 8,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_frames_opposite_slope_inputs,
-        .outputs = mstmm_sweep_frames_opposite_slope_outputs,
-        .ir_hash = "69112f9d1f987feff74241be2b546a3ad29ac77818c242fb74cf681c3d0b92af",
+        .inputs = mstmm_sweep_frames_reaction_wrench_slope_inputs,
+        .outputs = mstmm_sweep_frames_reaction_wrench_slope_outputs,
+        .ir_hash = "bd428f3495c3da3d008f1bf4953d71c26f03749360e55056c0b5e2d5deecc851",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5773,7 +5775,7 @@ static const mstmm_kernel mstmm_sweep_frames_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_frames_driven_effort_slope_inputs,
         .outputs = mstmm_sweep_frames_driven_effort_slope_outputs,
-        .ir_hash = "4515c48a8644431691d0834611b9919931e0381205ddbfa53a5e26b69ff12fa5",
+        .ir_hash = "75afc84d29471e5f09c6237ff6067bbe714afc1511321716610885f4f81824a8",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5795,7 +5797,7 @@ const mstmm_element mstmm_sweep_frames = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "frames",
-    .hash = "965435ae8ce7baca18e1801c7e97205917065638eb2f1b00f1fadc4d99ed461a",
+    .hash = "78dac46d7b79c14e942a49ddf3844a65cc59192113efb649da963c92a0b65f4e",
     .nq = 0,
     .nu = 0,
     .np = 0,

@@ -29,10 +29,10 @@ int mstmm_sweep_generic0_factor(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict J, const real *restrict W,
     const real *restrict floor_, const real *restrict S, real *restrict F, real *restrict G,
     real *restrict S_I);
-int mstmm_sweep_generic0_push(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic0_column_load(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict G, const real *restrict e,
     const real *restrict tau, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic0_answer(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic0_column_acceleration(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_sweep_generic0_qr_eliminate(const real *restrict H, const real *restrict J,
@@ -1353,7 +1353,7 @@ static const mstmm_port mstmm_sweep_generic0_factor_outputs[] = {
  * out y[0] (N, N*m) tau - H^T e
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic0_push(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic0_column_load(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict G, const real *restrict e,
     const real *restrict tau, real *restrict y, real *restrict e_I)
 {
@@ -1445,13 +1445,13 @@ int mstmm_sweep_generic0_push(const real *restrict Rc, const real *restrict r,
     return 0;
 }
 
-static int mstmm_sweep_generic0_push_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic0_column_load_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic0_push(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]);
+    return mstmm_sweep_generic0_column_load(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic0_push_inputs[] = {
+static const mstmm_port mstmm_sweep_generic0_column_load_inputs[] = {
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"H", 0, "", 0, 0},
@@ -1460,7 +1460,7 @@ static const mstmm_port mstmm_sweep_generic0_push_inputs[] = {
     {"tau", 0, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic0_push_outputs[] = {
+static const mstmm_port mstmm_sweep_generic0_column_load_outputs[] = {
     {"y", 0, "N, N*m", 0, 0},
     {"e_I", 6, "N, N*m", 1, 0},
 };
@@ -1478,7 +1478,7 @@ static const mstmm_port mstmm_sweep_generic0_push_outputs[] = {
  * out udot[0] accelerations of the free coordinates
  * out delta[6] deviation of the body's acceleration, at P
  */
-int mstmm_sweep_generic0_answer(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic0_column_acceleration(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta)
 {
@@ -1538,13 +1538,13 @@ int mstmm_sweep_generic0_answer(const real *restrict Rc, const real *restrict r,
     return 0;
 }
 
-static int mstmm_sweep_generic0_answer_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic0_column_acceleration_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic0_answer(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
+    return mstmm_sweep_generic0_column_acceleration(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic0_answer_inputs[] = {
+static const mstmm_port mstmm_sweep_generic0_column_acceleration_inputs[] = {
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"H", 0, "", 0, 0},
@@ -1554,7 +1554,7 @@ static const mstmm_port mstmm_sweep_generic0_answer_inputs[] = {
     {"delta_I", 6, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic0_answer_outputs[] = {
+static const mstmm_port mstmm_sweep_generic0_column_acceleration_outputs[] = {
     {"udot", 0, "", 0, 0},
     {"delta", 6, "", 0, 0},
 };
@@ -2845,26 +2845,26 @@ static const mstmm_kernel mstmm_sweep_generic0_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "push",
-        .function = (void (*)(void))mstmm_sweep_generic0_push,
-        .call = mstmm_sweep_generic0_push_call,
+        .name = "column_load",
+        .function = (void (*)(void))mstmm_sweep_generic0_column_load,
+        .call = mstmm_sweep_generic0_column_load_call,
         .n_inputs = 6,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic0_push_inputs,
-        .outputs = mstmm_sweep_generic0_push_outputs,
-        .ir_hash = "8a384690ab26daabd702f7293119a484abbe29bf85b33fa53ce464437f97d3d3",
+        .inputs = mstmm_sweep_generic0_column_load_inputs,
+        .outputs = mstmm_sweep_generic0_column_load_outputs,
+        .ir_hash = "4212bb37299f26ac6859a6dca06f0ef34c5b7b1998bad20e114a17f7c758fb15",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "answer",
-        .function = (void (*)(void))mstmm_sweep_generic0_answer,
-        .call = mstmm_sweep_generic0_answer_call,
+        .name = "column_acceleration",
+        .function = (void (*)(void))mstmm_sweep_generic0_column_acceleration,
+        .call = mstmm_sweep_generic0_column_acceleration_call,
         .n_inputs = 7,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic0_answer_inputs,
-        .outputs = mstmm_sweep_generic0_answer_outputs,
-        .ir_hash = "d67cddc2c2a227d8083b76c2e6da9ede86a0fb78a26533dbdbd8901c91cb2eb3",
+        .inputs = mstmm_sweep_generic0_column_acceleration_inputs,
+        .outputs = mstmm_sweep_generic0_column_acceleration_outputs,
+        .ir_hash = "771b1c73e13295305ac4aa23ac9c2d832a36ef6f971ff8a5e5083f2551232844",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -2958,7 +2958,7 @@ const mstmm_element mstmm_sweep_generic0 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic0",
-    .hash = "6d706fa0ac4dd63ca8045b63cb34143debf414a7adb29eb155c4b47840f532a1",
+    .hash = "77ed2de3e326bf8f4d4d04271b53e3799d20a900ee73cea2d2d59d00f3fc0758",
     .nq = 0,
     .nu = 0,
     .np = 0,

@@ -30,10 +30,10 @@ int mstmm_sweep_generic1_factor(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict J, const real *restrict W,
     const real *restrict floor_, const real *restrict S, real *restrict F, real *restrict G,
     real *restrict S_I);
-int mstmm_sweep_generic1_push(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic1_column_load(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict G, const real *restrict e,
     const real *restrict tau, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic1_answer(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic1_column_acceleration(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_sweep_generic1_qr_eliminate(const real *restrict H, const real *restrict J,
@@ -49,14 +49,14 @@ int mstmm_sweep_generic1_tangent_column(const real *restrict theta, const real *
     const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
     const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
     real *restrict G, real *restrict row);
-int mstmm_sweep_generic1_tangent_along(const real *restrict H, const real *restrict d_q,
+int mstmm_sweep_generic1_tangent_coordinate_change(const real *restrict H, const real *restrict d_q,
     real *restrict theta, real *restrict x);
 int mstmm_sweep_generic1_tangent_steady(const real *restrict theta, const real *restrict x,
     const real *restrict H, const real *restrict v, const real *restrict w, const real *restrict Q,
     const real *restrict f, const real *restrict d_u, const real *restrict d_s,
     const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
     real *restrict row);
-int mstmm_sweep_generic1_tangent_turning(const real *restrict theta, const real *restrict H,
+int mstmm_sweep_generic1_tangent_rotational(const real *restrict theta, const real *restrict H,
     const real *restrict w, const real *restrict Q, const real *restrict f,
     const real *restrict d_u, const real *restrict d_s, const real *restrict J,
     const real *restrict laws, real *restrict B, real *restrict G, real *restrict row);
@@ -66,29 +66,32 @@ int mstmm_sweep_generic1_tangent_rows(const real *restrict H, const real *restri
 int mstmm_sweep_generic1_tangent_reduce(const real *restrict inverse, const real *restrict right,
     const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
     real *restrict S);
-int mstmm_sweep_generic1_tangent_push(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic1_tangent_load(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict V, const real *restrict inverse,
     const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic1_tangent_answer(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic1_tangent_solution(const real *restrict Rc, const real *restrict r,
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, const real *restrict B, const real *restrict gain,
     const real *restrict y, real *restrict x, real *restrict z);
-int mstmm_sweep_generic1_tangent_push_known(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict V, const real *restrict inverse,
-    const real *restrict e, const real *restrict e_f, const real *restrict e_b, real *restrict y,
-    real *restrict e_I);
-int mstmm_sweep_generic1_tangent_answer_known(const real *restrict Rc, const real *restrict r,
-    const real *restrict w_I, const real *restrict v, const real *restrict w,
-    const real *restrict z_I, const real *restrict B, const real *restrict gain,
-    const real *restrict y, const real *restrict b, real *restrict x, real *restrict z);
+int mstmm_sweep_generic1_tangent_load_with_increments(const real *restrict Rc,
+    const real *restrict r, const real *restrict H, const real *restrict V,
+    const real *restrict inverse, const real *restrict e, const real *restrict e_f,
+    const real *restrict e_b, real *restrict y, real *restrict e_I);
+int mstmm_sweep_generic1_tangent_solution_with_increments(const real *restrict Rc,
+    const real *restrict r, const real *restrict w_I, const real *restrict v,
+    const real *restrict w, const real *restrict z_I, const real *restrict B,
+    const real *restrict gain, const real *restrict y, const real *restrict b, real *restrict x,
+    real *restrict z);
 int mstmm_sweep_generic1_complement(const real *restrict H, real *restrict W);
 int mstmm_sweep_generic1_divide(const real *restrict F, const real *restrict y, real *restrict z);
 int mstmm_sweep_generic1_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
-int mstmm_sweep_generic1_answered(const real *restrict y, const real *restrict z, real *restrict l);
-int mstmm_sweep_generic1_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
-int mstmm_sweep_generic1_exerted(const real *restrict S, const real *restrict H,
+int mstmm_sweep_generic1_add_known_part(const real *restrict y, const real *restrict z,
+    real *restrict l);
+int mstmm_sweep_generic1_add_multiplier_effort(const real *restrict y, const real *restrict x,
+    real *restrict y_0);
+int mstmm_sweep_generic1_required_load(const real *restrict S, const real *restrict H,
     const real *restrict udot, real *restrict e);
-int mstmm_sweep_generic1_push_on_ground(const real *restrict H, const real *restrict e,
+int mstmm_sweep_generic1_ground_column_load(const real *restrict H, const real *restrict e,
     const real *restrict tau, real *restrict y);
 int mstmm_sweep_generic1_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
@@ -101,9 +104,9 @@ int mstmm_sweep_generic1_effort_slope(const real *restrict H, const real *restri
     const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
 int mstmm_sweep_generic1_complement_slope(const real *restrict H, const real *restrict d_H,
     real *restrict d_W);
-int mstmm_sweep_generic1_answered_slope(const real *restrict y, const real *restrict z,
+int mstmm_sweep_generic1_add_known_part_slope(const real *restrict y, const real *restrict z,
     const real *restrict d_y, const real *restrict d_z, real *restrict d_l);
-int mstmm_sweep_generic1_pull_slope(const real *restrict y, const real *restrict x,
+int mstmm_sweep_generic1_add_multiplier_effort_slope(const real *restrict y, const real *restrict x,
     const real *restrict d_y, const real *restrict d_x, real *restrict d_y_0);
 
 #ifndef MSTMM_TWO
@@ -1876,7 +1879,7 @@ static const mstmm_guard mstmm_sweep_generic1_factor_guards[] = {
  * out y[1] (N, N*m) tau - H^T e
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic1_push(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic1_column_load(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict G, const real *restrict e,
     const real *restrict tau, real *restrict y, real *restrict e_I)
 {
@@ -1989,13 +1992,13 @@ int mstmm_sweep_generic1_push(const real *restrict Rc, const real *restrict r,
     return 0;
 }
 
-static int mstmm_sweep_generic1_push_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic1_column_load_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic1_push(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]);
+    return mstmm_sweep_generic1_column_load(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic1_push_inputs[] = {
+static const mstmm_port mstmm_sweep_generic1_column_load_inputs[] = {
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"H", 6, "", 0, 0},
@@ -2004,7 +2007,7 @@ static const mstmm_port mstmm_sweep_generic1_push_inputs[] = {
     {"tau", 1, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic1_push_outputs[] = {
+static const mstmm_port mstmm_sweep_generic1_column_load_outputs[] = {
     {"y", 1, "N, N*m", 0, 0},
     {"e_I", 6, "N, N*m", 1, 0},
 };
@@ -2022,7 +2025,7 @@ static const mstmm_port mstmm_sweep_generic1_push_outputs[] = {
  * out udot[1] accelerations of the free coordinates
  * out delta[6] deviation of the body's acceleration, at P
  */
-int mstmm_sweep_generic1_answer(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic1_column_acceleration(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta)
 {
@@ -2103,13 +2106,13 @@ int mstmm_sweep_generic1_answer(const real *restrict Rc, const real *restrict r,
     return 0;
 }
 
-static int mstmm_sweep_generic1_answer_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic1_column_acceleration_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic1_answer(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
+    return mstmm_sweep_generic1_column_acceleration(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic1_answer_inputs[] = {
+static const mstmm_port mstmm_sweep_generic1_column_acceleration_inputs[] = {
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"H", 6, "", 0, 0},
@@ -2119,7 +2122,7 @@ static const mstmm_port mstmm_sweep_generic1_answer_inputs[] = {
     {"delta_I", 6, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic1_answer_outputs[] = {
+static const mstmm_port mstmm_sweep_generic1_column_acceleration_outputs[] = {
     {"udot", 1, "", 0, 0},
     {"delta", 6, "", 0, 0},
 };
@@ -3071,7 +3074,7 @@ static const mstmm_port mstmm_sweep_generic1_tangent_column_outputs[] = {
  * out theta[3] rotation of the body along the direction, body axes
  * out x[3] displacement of P along the direction, body axes
  */
-int mstmm_sweep_generic1_tangent_along(const real *restrict H, const real *restrict d_q,
+int mstmm_sweep_generic1_tangent_coordinate_change(const real *restrict H, const real *restrict d_q,
     real *restrict theta, real *restrict x)
 {
     const real t0 = H[3] * d_q[0];
@@ -3089,18 +3092,18 @@ int mstmm_sweep_generic1_tangent_along(const real *restrict H, const real *restr
     return 0;
 }
 
-static int mstmm_sweep_generic1_tangent_along_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic1_tangent_coordinate_change_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic1_tangent_along(in[0], in[1], out[0], out[1]);
+    return mstmm_sweep_generic1_tangent_coordinate_change(in[0], in[1], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic1_tangent_along_inputs[] = {
+static const mstmm_port mstmm_sweep_generic1_tangent_coordinate_change_inputs[] = {
     {"H", 6, "", 0, 0},
     {"d_q", 1, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic1_tangent_along_outputs[] = {
+static const mstmm_port mstmm_sweep_generic1_tangent_coordinate_change_outputs[] = {
     {"theta", 3, "", 0, 0},
     {"x", 3, "", 0, 0},
 };
@@ -3384,7 +3387,7 @@ static const mstmm_port mstmm_sweep_generic1_tangent_steady_outputs[] = {
  * out G[6] change of the carried load
  * out row[1] change of the rows by load, rotors and laws
  */
-int mstmm_sweep_generic1_tangent_turning(const real *restrict theta, const real *restrict H,
+int mstmm_sweep_generic1_tangent_rotational(const real *restrict theta, const real *restrict H,
     const real *restrict w, const real *restrict Q, const real *restrict f,
     const real *restrict d_u, const real *restrict d_s, const real *restrict J,
     const real *restrict laws, real *restrict B, real *restrict G, real *restrict row)
@@ -3491,13 +3494,13 @@ int mstmm_sweep_generic1_tangent_turning(const real *restrict theta, const real 
     return 0;
 }
 
-static int mstmm_sweep_generic1_tangent_turning_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic1_tangent_rotational_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic1_tangent_turning(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1], out[2]);
+    return mstmm_sweep_generic1_tangent_rotational(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1], out[2]);
 }
 
-static const mstmm_port mstmm_sweep_generic1_tangent_turning_inputs[] = {
+static const mstmm_port mstmm_sweep_generic1_tangent_rotational_inputs[] = {
     {"theta", 3, "", 0, 0},
     {"H", 6, "", 0, 0},
     {"w", 3, "", 0, 0},
@@ -3509,7 +3512,7 @@ static const mstmm_port mstmm_sweep_generic1_tangent_turning_inputs[] = {
     {"laws", 1, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic1_tangent_turning_outputs[] = {
+static const mstmm_port mstmm_sweep_generic1_tangent_rotational_outputs[] = {
     {"B", 9, "", 0, 0},
     {"G", 6, "", 0, 0},
     {"row", 1, "", 0, 0},
@@ -3699,7 +3702,7 @@ static const mstmm_port mstmm_sweep_generic1_tangent_reduce_outputs[] = {
  * out y[1] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic1_tangent_push(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic1_tangent_load(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict V, const real *restrict inverse,
     const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I)
 {
@@ -3814,13 +3817,13 @@ int mstmm_sweep_generic1_tangent_push(const real *restrict Rc, const real *restr
     return 0;
 }
 
-static int mstmm_sweep_generic1_tangent_push_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic1_tangent_load_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic1_tangent_push(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
+    return mstmm_sweep_generic1_tangent_load(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic1_tangent_push_inputs[] = {
+static const mstmm_port mstmm_sweep_generic1_tangent_load_inputs[] = {
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"H", 6, "", 0, 0},
@@ -3830,7 +3833,7 @@ static const mstmm_port mstmm_sweep_generic1_tangent_push_inputs[] = {
     {"e_f", 1, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic1_tangent_push_outputs[] = {
+static const mstmm_port mstmm_sweep_generic1_tangent_load_outputs[] = {
     {"y", 1, "", 0, 0},
     {"e_I", 6, "N, N*m", 1, 0},
 };
@@ -3850,7 +3853,7 @@ static const mstmm_port mstmm_sweep_generic1_tangent_push_outputs[] = {
  * out x[1] unknowns
  * out z[9] change of the body's motion, own axes
  */
-int mstmm_sweep_generic1_tangent_answer(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic1_tangent_solution(const real *restrict Rc, const real *restrict r,
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, const real *restrict B, const real *restrict gain,
     const real *restrict y, real *restrict x, real *restrict z)
@@ -4030,13 +4033,13 @@ int mstmm_sweep_generic1_tangent_answer(const real *restrict Rc, const real *res
     return 0;
 }
 
-static int mstmm_sweep_generic1_tangent_answer_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic1_tangent_solution_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic1_tangent_answer(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1]);
+    return mstmm_sweep_generic1_tangent_solution(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic1_tangent_answer_inputs[] = {
+static const mstmm_port mstmm_sweep_generic1_tangent_solution_inputs[] = {
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"w_I", 3, "rad/s", 0, 0},
@@ -4048,7 +4051,7 @@ static const mstmm_port mstmm_sweep_generic1_tangent_answer_inputs[] = {
     {"y", 1, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic1_tangent_answer_outputs[] = {
+static const mstmm_port mstmm_sweep_generic1_tangent_solution_outputs[] = {
     {"x", 1, "", 0, 0},
     {"z", 9, "", 0, 0},
 };
@@ -4067,10 +4070,10 @@ static const mstmm_port mstmm_sweep_generic1_tangent_answer_outputs[] = {
  * out y[1] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic1_tangent_push_known(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict V, const real *restrict inverse,
-    const real *restrict e, const real *restrict e_f, const real *restrict e_b, real *restrict y,
-    real *restrict e_I)
+int mstmm_sweep_generic1_tangent_load_with_increments(const real *restrict Rc,
+    const real *restrict r, const real *restrict H, const real *restrict V,
+    const real *restrict inverse, const real *restrict e, const real *restrict e_f,
+    const real *restrict e_b, real *restrict y, real *restrict e_I)
 {
     const real t0 = H[0] * e[0];
     const real t1 = H[1] * e[1];
@@ -4189,13 +4192,13 @@ int mstmm_sweep_generic1_tangent_push_known(const real *restrict Rc, const real 
     return 0;
 }
 
-static int mstmm_sweep_generic1_tangent_push_known_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic1_tangent_load_with_increments_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic1_tangent_push_known(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1]);
+    return mstmm_sweep_generic1_tangent_load_with_increments(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic1_tangent_push_known_inputs[] = {
+static const mstmm_port mstmm_sweep_generic1_tangent_load_with_increments_inputs[] = {
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"H", 6, "", 0, 0},
@@ -4206,7 +4209,7 @@ static const mstmm_port mstmm_sweep_generic1_tangent_push_known_inputs[] = {
     {"e_b", 6, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic1_tangent_push_known_outputs[] = {
+static const mstmm_port mstmm_sweep_generic1_tangent_load_with_increments_outputs[] = {
     {"y", 1, "", 0, 0},
     {"e_I", 6, "N, N*m", 1, 0},
 };
@@ -4227,10 +4230,11 @@ static const mstmm_port mstmm_sweep_generic1_tangent_push_known_outputs[] = {
  * out x[1] unknowns
  * out z[9] change of the body's motion, own axes
  */
-int mstmm_sweep_generic1_tangent_answer_known(const real *restrict Rc, const real *restrict r,
-    const real *restrict w_I, const real *restrict v, const real *restrict w,
-    const real *restrict z_I, const real *restrict B, const real *restrict gain,
-    const real *restrict y, const real *restrict b, real *restrict x, real *restrict z)
+int mstmm_sweep_generic1_tangent_solution_with_increments(const real *restrict Rc,
+    const real *restrict r, const real *restrict w_I, const real *restrict v,
+    const real *restrict w, const real *restrict z_I, const real *restrict B,
+    const real *restrict gain, const real *restrict y, const real *restrict b, real *restrict x,
+    real *restrict z)
 {
     const real t0 = Rc[0] * z_I[0];
     const real t1 = Rc[3] * z_I[1];
@@ -4416,13 +4420,13 @@ int mstmm_sweep_generic1_tangent_answer_known(const real *restrict Rc, const rea
     return 0;
 }
 
-static int mstmm_sweep_generic1_tangent_answer_known_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic1_tangent_solution_with_increments_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic1_tangent_answer_known(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], out[0], out[1]);
+    return mstmm_sweep_generic1_tangent_solution_with_increments(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic1_tangent_answer_known_inputs[] = {
+static const mstmm_port mstmm_sweep_generic1_tangent_solution_with_increments_inputs[] = {
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"w_I", 3, "rad/s", 0, 0},
@@ -4435,7 +4439,7 @@ static const mstmm_port mstmm_sweep_generic1_tangent_answer_known_inputs[] = {
     {"b", 9, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic1_tangent_answer_known_outputs[] = {
+static const mstmm_port mstmm_sweep_generic1_tangent_solution_with_increments_outputs[] = {
     {"x", 1, "", 0, 0},
     {"z", 9, "", 0, 0},
 };
@@ -4645,7 +4649,8 @@ static const mstmm_port mstmm_sweep_generic1_couple_outputs[] = {
  * in  z[1] of the row
  * out l[1] known part of the row, added to what is there
  */
-int mstmm_sweep_generic1_answered(const real *restrict y, const real *restrict z, real *restrict l)
+int mstmm_sweep_generic1_add_known_part(const real *restrict y, const real *restrict z,
+    real *restrict l)
 {
     const real t0 = y[0] * z[0];
     const real t1 = -t0;
@@ -4653,18 +4658,18 @@ int mstmm_sweep_generic1_answered(const real *restrict y, const real *restrict z
     return 0;
 }
 
-static int mstmm_sweep_generic1_answered_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic1_add_known_part_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic1_answered(in[0], in[1], out[0]);
+    return mstmm_sweep_generic1_add_known_part(in[0], in[1], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_generic1_answered_inputs[] = {
+static const mstmm_port mstmm_sweep_generic1_add_known_part_inputs[] = {
     {"y", 1, "", 0, 0},
     {"z", 1, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic1_answered_outputs[] = {
+static const mstmm_port mstmm_sweep_generic1_add_known_part_outputs[] = {
     {"l", 1, "", 1, 0},
 };
 
@@ -4675,25 +4680,26 @@ static const mstmm_port mstmm_sweep_generic1_answered_outputs[] = {
  * in  x[1] (N, N*m) multiplier
  * out y_0[1] tau - H^T e, added to what is there
  */
-int mstmm_sweep_generic1_pull(const real *restrict y, const real *restrict x, real *restrict y_0)
+int mstmm_sweep_generic1_add_multiplier_effort(const real *restrict y, const real *restrict x,
+    real *restrict y_0)
 {
     const real t0 = y[0] * x[0];
     y_0[0] += t0;
     return 0;
 }
 
-static int mstmm_sweep_generic1_pull_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic1_add_multiplier_effort_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic1_pull(in[0], in[1], out[0]);
+    return mstmm_sweep_generic1_add_multiplier_effort(in[0], in[1], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_generic1_pull_inputs[] = {
+static const mstmm_port mstmm_sweep_generic1_add_multiplier_effort_inputs[] = {
     {"y", 1, "", 0, 0},
     {"x", 1, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic1_pull_outputs[] = {
+static const mstmm_port mstmm_sweep_generic1_add_multiplier_effort_outputs[] = {
     {"y_0", 1, "", 1, 0},
 };
 
@@ -4703,7 +4709,7 @@ static const mstmm_port mstmm_sweep_generic1_pull_outputs[] = {
  * in  udot[1] accelerations of the coordinates
  * out e[6] (N, N*m) force part of f = S a + e, at P
  */
-int mstmm_sweep_generic1_exerted(const real *restrict S, const real *restrict H,
+int mstmm_sweep_generic1_required_load(const real *restrict S, const real *restrict H,
     const real *restrict udot, real *restrict e)
 {
     const real t0 = S[0] * H[0];
@@ -4787,19 +4793,19 @@ int mstmm_sweep_generic1_exerted(const real *restrict S, const real *restrict H,
     return 0;
 }
 
-static int mstmm_sweep_generic1_exerted_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic1_required_load_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic1_exerted(in[0], in[1], in[2], out[0]);
+    return mstmm_sweep_generic1_required_load(in[0], in[1], in[2], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_generic1_exerted_inputs[] = {
+static const mstmm_port mstmm_sweep_generic1_required_load_inputs[] = {
     {"S", 21, "", 0, 0},
     {"H", 6, "", 0, 0},
     {"udot", 1, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic1_exerted_outputs[] = {
+static const mstmm_port mstmm_sweep_generic1_required_load_outputs[] = {
     {"e", 6, "N, N*m", 0, 0},
 };
 
@@ -4811,7 +4817,7 @@ static const mstmm_port mstmm_sweep_generic1_exerted_outputs[] = {
  * in  tau[1] (N, N*m) efforts of the right-hand side on the free coordinates
  * out y[1] (N, N*m) tau - H^T e
  */
-int mstmm_sweep_generic1_push_on_ground(const real *restrict H, const real *restrict e,
+int mstmm_sweep_generic1_ground_column_load(const real *restrict H, const real *restrict e,
     const real *restrict tau, real *restrict y)
 {
     const real t0 = H[0] * e[0];
@@ -4830,19 +4836,19 @@ int mstmm_sweep_generic1_push_on_ground(const real *restrict H, const real *rest
     return 0;
 }
 
-static int mstmm_sweep_generic1_push_on_ground_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic1_ground_column_load_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic1_push_on_ground(in[0], in[1], in[2], out[0]);
+    return mstmm_sweep_generic1_ground_column_load(in[0], in[1], in[2], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_generic1_push_on_ground_inputs[] = {
+static const mstmm_port mstmm_sweep_generic1_ground_column_load_inputs[] = {
     {"H", 6, "", 0, 0},
     {"e", 6, "N, N*m", 0, 0},
     {"tau", 1, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic1_push_on_ground_outputs[] = {
+static const mstmm_port mstmm_sweep_generic1_ground_column_load_outputs[] = {
     {"y", 1, "N, N*m", 0, 0},
 };
 
@@ -5646,7 +5652,7 @@ static const mstmm_port mstmm_sweep_generic1_complement_slope_outputs[] = {
     {"d_W", 36, "", 0, 0},
 };
 
-/* answered and its derivative along a direction
+/* add_known_part and its derivative along a direction
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  y[1] tau - H^T e
@@ -5655,7 +5661,7 @@ static const mstmm_port mstmm_sweep_generic1_complement_slope_outputs[] = {
  * in  d_z[1] derivative of z
  * out d_l[1] derivative of l, added to what is there
  */
-int mstmm_sweep_generic1_answered_slope(const real *restrict y, const real *restrict z,
+int mstmm_sweep_generic1_add_known_part_slope(const real *restrict y, const real *restrict z,
     const real *restrict d_y, const real *restrict d_z, real *restrict d_l)
 {
     const real t0 = z[0] * d_y[0];
@@ -5666,24 +5672,24 @@ int mstmm_sweep_generic1_answered_slope(const real *restrict y, const real *rest
     return 0;
 }
 
-static int mstmm_sweep_generic1_answered_slope_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic1_add_known_part_slope_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic1_answered_slope(in[0], in[1], in[2], in[3], out[0]);
+    return mstmm_sweep_generic1_add_known_part_slope(in[0], in[1], in[2], in[3], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_generic1_answered_slope_inputs[] = {
+static const mstmm_port mstmm_sweep_generic1_add_known_part_slope_inputs[] = {
     {"y", 1, "", 0, 0},
     {"z", 1, "", 0, 0},
     {"d_y", 1, "", 0, 0},
     {"d_z", 1, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic1_answered_slope_outputs[] = {
+static const mstmm_port mstmm_sweep_generic1_add_known_part_slope_outputs[] = {
     {"d_l", 1, "", 1, 0},
 };
 
-/* pull and its derivative along a direction
+/* add_multiplier_effort and its derivative along a direction
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  y[1] of the row
@@ -5692,7 +5698,7 @@ static const mstmm_port mstmm_sweep_generic1_answered_slope_outputs[] = {
  * in  d_x[1] (N, N*m) derivative of x
  * out d_y_0[1] derivative of y_0, added to what is there
  */
-int mstmm_sweep_generic1_pull_slope(const real *restrict y, const real *restrict x,
+int mstmm_sweep_generic1_add_multiplier_effort_slope(const real *restrict y, const real *restrict x,
     const real *restrict d_y, const real *restrict d_x, real *restrict d_y_0)
 {
     const real t0 = x[0] * d_y[0];
@@ -5702,20 +5708,20 @@ int mstmm_sweep_generic1_pull_slope(const real *restrict y, const real *restrict
     return 0;
 }
 
-static int mstmm_sweep_generic1_pull_slope_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic1_add_multiplier_effort_slope_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic1_pull_slope(in[0], in[1], in[2], in[3], out[0]);
+    return mstmm_sweep_generic1_add_multiplier_effort_slope(in[0], in[1], in[2], in[3], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_generic1_pull_slope_inputs[] = {
+static const mstmm_port mstmm_sweep_generic1_add_multiplier_effort_slope_inputs[] = {
     {"y", 1, "", 0, 0},
     {"x", 1, "N, N*m", 0, 0},
     {"d_y", 1, "", 0, 0},
     {"d_x", 1, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic1_pull_slope_outputs[] = {
+static const mstmm_port mstmm_sweep_generic1_add_multiplier_effort_slope_outputs[] = {
     {"d_y_0", 1, "", 1, 0},
 };
 
@@ -5793,26 +5799,26 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .guards = mstmm_sweep_generic1_factor_guards,
     },
     {
-        .name = "push",
-        .function = (void (*)(void))mstmm_sweep_generic1_push,
-        .call = mstmm_sweep_generic1_push_call,
+        .name = "column_load",
+        .function = (void (*)(void))mstmm_sweep_generic1_column_load,
+        .call = mstmm_sweep_generic1_column_load_call,
         .n_inputs = 6,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic1_push_inputs,
-        .outputs = mstmm_sweep_generic1_push_outputs,
-        .ir_hash = "cdd1e80732c06f4cf1b7621536a4b8d43e9a7c9857ac397f480c713179d1ddb6",
+        .inputs = mstmm_sweep_generic1_column_load_inputs,
+        .outputs = mstmm_sweep_generic1_column_load_outputs,
+        .ir_hash = "480f574c050fb47a69daae2dc8e2993327ef8c7312d2526024b07f9e49ef7963",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "answer",
-        .function = (void (*)(void))mstmm_sweep_generic1_answer,
-        .call = mstmm_sweep_generic1_answer_call,
+        .name = "column_acceleration",
+        .function = (void (*)(void))mstmm_sweep_generic1_column_acceleration,
+        .call = mstmm_sweep_generic1_column_acceleration_call,
         .n_inputs = 7,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic1_answer_inputs,
-        .outputs = mstmm_sweep_generic1_answer_outputs,
-        .ir_hash = "d05edbd62e165f6eb85b17e9198756799e728fd4406fbc31a7d2badb7dc3cf2b",
+        .inputs = mstmm_sweep_generic1_column_acceleration_inputs,
+        .outputs = mstmm_sweep_generic1_column_acceleration_outputs,
+        .ir_hash = "0382dc0e6458c1787b926c32bc437782b4802155560fac79e582443cb3f88f28",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5853,14 +5859,14 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "tangent_along",
-        .function = (void (*)(void))mstmm_sweep_generic1_tangent_along,
-        .call = mstmm_sweep_generic1_tangent_along_call,
+        .name = "tangent_coordinate_change",
+        .function = (void (*)(void))mstmm_sweep_generic1_tangent_coordinate_change,
+        .call = mstmm_sweep_generic1_tangent_coordinate_change_call,
         .n_inputs = 2,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic1_tangent_along_inputs,
-        .outputs = mstmm_sweep_generic1_tangent_along_outputs,
-        .ir_hash = "a0f8daab22b87a9f49d9c375f9467657511ee8dee4db99527ea115c3269a279b",
+        .inputs = mstmm_sweep_generic1_tangent_coordinate_change_inputs,
+        .outputs = mstmm_sweep_generic1_tangent_coordinate_change_outputs,
+        .ir_hash = "4eda3f3ad2046a02ba43cf2b53649d07d786cb03a3096f5ee28b3340d3b68e64",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5877,14 +5883,14 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "tangent_turning",
-        .function = (void (*)(void))mstmm_sweep_generic1_tangent_turning,
-        .call = mstmm_sweep_generic1_tangent_turning_call,
+        .name = "tangent_rotational",
+        .function = (void (*)(void))mstmm_sweep_generic1_tangent_rotational,
+        .call = mstmm_sweep_generic1_tangent_rotational_call,
         .n_inputs = 9,
         .n_outputs = 3,
-        .inputs = mstmm_sweep_generic1_tangent_turning_inputs,
-        .outputs = mstmm_sweep_generic1_tangent_turning_outputs,
-        .ir_hash = "e314cfff8eac5683a1414e071976f5d9c8d65bba5eef7ac144bc13c98cfcf0b0",
+        .inputs = mstmm_sweep_generic1_tangent_rotational_inputs,
+        .outputs = mstmm_sweep_generic1_tangent_rotational_outputs,
+        .ir_hash = "f5df49d71d021175eb4244aa28b212f581dc4a9b67213c8eeae3e8c76316da22",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5913,50 +5919,50 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "tangent_push",
-        .function = (void (*)(void))mstmm_sweep_generic1_tangent_push,
-        .call = mstmm_sweep_generic1_tangent_push_call,
+        .name = "tangent_load",
+        .function = (void (*)(void))mstmm_sweep_generic1_tangent_load,
+        .call = mstmm_sweep_generic1_tangent_load_call,
         .n_inputs = 7,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic1_tangent_push_inputs,
-        .outputs = mstmm_sweep_generic1_tangent_push_outputs,
-        .ir_hash = "a5e6165cda24366934f1d71c2e26742861a6779e3c9817c7d2c447fee0542c93",
+        .inputs = mstmm_sweep_generic1_tangent_load_inputs,
+        .outputs = mstmm_sweep_generic1_tangent_load_outputs,
+        .ir_hash = "0add2299e385945c7f4a6152b41da854849f6aaa6e083071120223dacb70e515",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "tangent_answer",
-        .function = (void (*)(void))mstmm_sweep_generic1_tangent_answer,
-        .call = mstmm_sweep_generic1_tangent_answer_call,
+        .name = "tangent_solution",
+        .function = (void (*)(void))mstmm_sweep_generic1_tangent_solution,
+        .call = mstmm_sweep_generic1_tangent_solution_call,
         .n_inputs = 9,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic1_tangent_answer_inputs,
-        .outputs = mstmm_sweep_generic1_tangent_answer_outputs,
-        .ir_hash = "1341dcff3cb24c0357d88593a1567c22dc6b0638070bcb6b4d674c371a7f27ff",
+        .inputs = mstmm_sweep_generic1_tangent_solution_inputs,
+        .outputs = mstmm_sweep_generic1_tangent_solution_outputs,
+        .ir_hash = "5ff6e2f3d2db5316a368452d4aeb5d49a1961264d85fc6e77555b7b35b9ad392",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "tangent_push_known",
-        .function = (void (*)(void))mstmm_sweep_generic1_tangent_push_known,
-        .call = mstmm_sweep_generic1_tangent_push_known_call,
+        .name = "tangent_load_with_increments",
+        .function = (void (*)(void))mstmm_sweep_generic1_tangent_load_with_increments,
+        .call = mstmm_sweep_generic1_tangent_load_with_increments_call,
         .n_inputs = 8,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic1_tangent_push_known_inputs,
-        .outputs = mstmm_sweep_generic1_tangent_push_known_outputs,
-        .ir_hash = "73d9cb0fb02787d9d6edb5f990b957e0c915d165ec5b8905073fec5396cdca38",
+        .inputs = mstmm_sweep_generic1_tangent_load_with_increments_inputs,
+        .outputs = mstmm_sweep_generic1_tangent_load_with_increments_outputs,
+        .ir_hash = "82a0a56a47ae6b00cfd01a590f15d371aefa1d90e182be0b98a7c5fab4f2f35c",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "tangent_answer_known",
-        .function = (void (*)(void))mstmm_sweep_generic1_tangent_answer_known,
-        .call = mstmm_sweep_generic1_tangent_answer_known_call,
+        .name = "tangent_solution_with_increments",
+        .function = (void (*)(void))mstmm_sweep_generic1_tangent_solution_with_increments,
+        .call = mstmm_sweep_generic1_tangent_solution_with_increments_call,
         .n_inputs = 10,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic1_tangent_answer_known_inputs,
-        .outputs = mstmm_sweep_generic1_tangent_answer_known_outputs,
-        .ir_hash = "aec70611f3efbffbdc2969ba62109320a98d86cd0c437e3dc57827eac8c4145d",
+        .inputs = mstmm_sweep_generic1_tangent_solution_with_increments_inputs,
+        .outputs = mstmm_sweep_generic1_tangent_solution_with_increments_outputs,
+        .ir_hash = "8c9f830f8187156f74aab6d68dc9c193fd6f22545a4d4272d87e923505c019b3",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5997,50 +6003,50 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "answered",
-        .function = (void (*)(void))mstmm_sweep_generic1_answered,
-        .call = mstmm_sweep_generic1_answered_call,
+        .name = "add_known_part",
+        .function = (void (*)(void))mstmm_sweep_generic1_add_known_part,
+        .call = mstmm_sweep_generic1_add_known_part_call,
         .n_inputs = 2,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_generic1_answered_inputs,
-        .outputs = mstmm_sweep_generic1_answered_outputs,
-        .ir_hash = "b40a8723845ea02670aa0bb72f35bcb8838edcafe556363158a2884ae7e597a1",
+        .inputs = mstmm_sweep_generic1_add_known_part_inputs,
+        .outputs = mstmm_sweep_generic1_add_known_part_outputs,
+        .ir_hash = "8ffdcbe3b5905b31727108a41a45227795c0343f5b87e5d14281fcbf9b3702e3",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "pull",
-        .function = (void (*)(void))mstmm_sweep_generic1_pull,
-        .call = mstmm_sweep_generic1_pull_call,
+        .name = "add_multiplier_effort",
+        .function = (void (*)(void))mstmm_sweep_generic1_add_multiplier_effort,
+        .call = mstmm_sweep_generic1_add_multiplier_effort_call,
         .n_inputs = 2,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_generic1_pull_inputs,
-        .outputs = mstmm_sweep_generic1_pull_outputs,
-        .ir_hash = "30094eb52e237e93c9c0e41a16faa9ffc680b97d51a2884bbaee2da82f30fc6e",
+        .inputs = mstmm_sweep_generic1_add_multiplier_effort_inputs,
+        .outputs = mstmm_sweep_generic1_add_multiplier_effort_outputs,
+        .ir_hash = "f5e432d29084336d4a94dfcb919861cfc72db310bfb03caee28593c58140218e",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "exerted",
-        .function = (void (*)(void))mstmm_sweep_generic1_exerted,
-        .call = mstmm_sweep_generic1_exerted_call,
+        .name = "required_load",
+        .function = (void (*)(void))mstmm_sweep_generic1_required_load,
+        .call = mstmm_sweep_generic1_required_load_call,
         .n_inputs = 3,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_generic1_exerted_inputs,
-        .outputs = mstmm_sweep_generic1_exerted_outputs,
-        .ir_hash = "7402757c18cfd2604f5527ae5368e6a49b536d73a01ecfde0f78508a810d7337",
+        .inputs = mstmm_sweep_generic1_required_load_inputs,
+        .outputs = mstmm_sweep_generic1_required_load_outputs,
+        .ir_hash = "22f167201363c0c063cf4308fd75452842326cfeb9d2491881be304ad8902d62",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "push_on_ground",
-        .function = (void (*)(void))mstmm_sweep_generic1_push_on_ground,
-        .call = mstmm_sweep_generic1_push_on_ground_call,
+        .name = "ground_column_load",
+        .function = (void (*)(void))mstmm_sweep_generic1_ground_column_load,
+        .call = mstmm_sweep_generic1_ground_column_load_call,
         .n_inputs = 3,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_generic1_push_on_ground_inputs,
-        .outputs = mstmm_sweep_generic1_push_on_ground_outputs,
-        .ir_hash = "f2ab8595d1ec9a77e3d5feff3f64be7efb397d5f18f98c5c9149b66640ccb19e",
+        .inputs = mstmm_sweep_generic1_ground_column_load_inputs,
+        .outputs = mstmm_sweep_generic1_ground_column_load_outputs,
+        .ir_hash = "de8a1bb482427c6dd2e4962b7506e82be82bd0ca7cf3327a2b9add655bb3c244",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -6081,26 +6087,26 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "answered_slope",
-        .function = (void (*)(void))mstmm_sweep_generic1_answered_slope,
-        .call = mstmm_sweep_generic1_answered_slope_call,
+        .name = "add_known_part_slope",
+        .function = (void (*)(void))mstmm_sweep_generic1_add_known_part_slope,
+        .call = mstmm_sweep_generic1_add_known_part_slope_call,
         .n_inputs = 4,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_generic1_answered_slope_inputs,
-        .outputs = mstmm_sweep_generic1_answered_slope_outputs,
-        .ir_hash = "b3ce9acda5a4c29fe3d53bbaef29d877062d785892e3e196fd99f124043a2a6d",
+        .inputs = mstmm_sweep_generic1_add_known_part_slope_inputs,
+        .outputs = mstmm_sweep_generic1_add_known_part_slope_outputs,
+        .ir_hash = "01b47c330bb0c6719804e8e9602c37587f335a52b2212fa8be1cce0b2d3c8e8f",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "pull_slope",
-        .function = (void (*)(void))mstmm_sweep_generic1_pull_slope,
-        .call = mstmm_sweep_generic1_pull_slope_call,
+        .name = "add_multiplier_effort_slope",
+        .function = (void (*)(void))mstmm_sweep_generic1_add_multiplier_effort_slope,
+        .call = mstmm_sweep_generic1_add_multiplier_effort_slope_call,
         .n_inputs = 4,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_generic1_pull_slope_inputs,
-        .outputs = mstmm_sweep_generic1_pull_slope_outputs,
-        .ir_hash = "4488aa14c7e91a0a80236bf077cf7a19fc3737b4df4b27394c926fd05c190be7",
+        .inputs = mstmm_sweep_generic1_add_multiplier_effort_slope_inputs,
+        .outputs = mstmm_sweep_generic1_add_multiplier_effort_slope_outputs,
+        .ir_hash = "897fa67eed2540918ea6c301d8cbc89862e777cb30c0badba6a99788372be2ac",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -6110,7 +6116,7 @@ const mstmm_element mstmm_sweep_generic1 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic1",
-    .hash = "0f1be558fbadf414322a26e299e939ad1ce7695c151f2ec49f539f2ad6fb18a4",
+    .hash = "8aa0c7990621980c5a86fc5506b46343dc9351f5593558dd82df4854575daee6",
     .nq = 0,
     .nu = 0,
     .np = 0,

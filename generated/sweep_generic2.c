@@ -30,10 +30,10 @@ int mstmm_sweep_generic2_factor(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict J, const real *restrict W,
     const real *restrict floor_, const real *restrict S, real *restrict F, real *restrict G,
     real *restrict S_I);
-int mstmm_sweep_generic2_push(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic2_column_load(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict G, const real *restrict e,
     const real *restrict tau, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic2_answer(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic2_column_acceleration(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_sweep_generic2_qr_eliminate(const real *restrict H, const real *restrict J,
@@ -49,14 +49,14 @@ int mstmm_sweep_generic2_tangent_column(const real *restrict theta, const real *
     const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
     const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
     real *restrict G, real *restrict row);
-int mstmm_sweep_generic2_tangent_along(const real *restrict H, const real *restrict d_q,
+int mstmm_sweep_generic2_tangent_coordinate_change(const real *restrict H, const real *restrict d_q,
     real *restrict theta, real *restrict x);
 int mstmm_sweep_generic2_tangent_steady(const real *restrict theta, const real *restrict x,
     const real *restrict H, const real *restrict v, const real *restrict w, const real *restrict Q,
     const real *restrict f, const real *restrict d_u, const real *restrict d_s,
     const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
     real *restrict row);
-int mstmm_sweep_generic2_tangent_turning(const real *restrict theta, const real *restrict H,
+int mstmm_sweep_generic2_tangent_rotational(const real *restrict theta, const real *restrict H,
     const real *restrict w, const real *restrict Q, const real *restrict f,
     const real *restrict d_u, const real *restrict d_s, const real *restrict J,
     const real *restrict laws, real *restrict B, real *restrict G, real *restrict row);
@@ -66,29 +66,32 @@ int mstmm_sweep_generic2_tangent_rows(const real *restrict H, const real *restri
 int mstmm_sweep_generic2_tangent_reduce(const real *restrict inverse, const real *restrict right,
     const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
     real *restrict S);
-int mstmm_sweep_generic2_tangent_push(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic2_tangent_load(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict V, const real *restrict inverse,
     const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic2_tangent_answer(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic2_tangent_solution(const real *restrict Rc, const real *restrict r,
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, const real *restrict B, const real *restrict gain,
     const real *restrict y, real *restrict x, real *restrict z);
-int mstmm_sweep_generic2_tangent_push_known(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict V, const real *restrict inverse,
-    const real *restrict e, const real *restrict e_f, const real *restrict e_b, real *restrict y,
-    real *restrict e_I);
-int mstmm_sweep_generic2_tangent_answer_known(const real *restrict Rc, const real *restrict r,
-    const real *restrict w_I, const real *restrict v, const real *restrict w,
-    const real *restrict z_I, const real *restrict B, const real *restrict gain,
-    const real *restrict y, const real *restrict b, real *restrict x, real *restrict z);
+int mstmm_sweep_generic2_tangent_load_with_increments(const real *restrict Rc,
+    const real *restrict r, const real *restrict H, const real *restrict V,
+    const real *restrict inverse, const real *restrict e, const real *restrict e_f,
+    const real *restrict e_b, real *restrict y, real *restrict e_I);
+int mstmm_sweep_generic2_tangent_solution_with_increments(const real *restrict Rc,
+    const real *restrict r, const real *restrict w_I, const real *restrict v,
+    const real *restrict w, const real *restrict z_I, const real *restrict B,
+    const real *restrict gain, const real *restrict y, const real *restrict b, real *restrict x,
+    real *restrict z);
 int mstmm_sweep_generic2_complement(const real *restrict H, real *restrict W);
 int mstmm_sweep_generic2_divide(const real *restrict F, const real *restrict y, real *restrict z);
 int mstmm_sweep_generic2_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
-int mstmm_sweep_generic2_answered(const real *restrict y, const real *restrict z, real *restrict l);
-int mstmm_sweep_generic2_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
-int mstmm_sweep_generic2_exerted(const real *restrict S, const real *restrict H,
+int mstmm_sweep_generic2_add_known_part(const real *restrict y, const real *restrict z,
+    real *restrict l);
+int mstmm_sweep_generic2_add_multiplier_effort(const real *restrict y, const real *restrict x,
+    real *restrict y_0);
+int mstmm_sweep_generic2_required_load(const real *restrict S, const real *restrict H,
     const real *restrict udot, real *restrict e);
-int mstmm_sweep_generic2_push_on_ground(const real *restrict H, const real *restrict e,
+int mstmm_sweep_generic2_ground_column_load(const real *restrict H, const real *restrict e,
     const real *restrict tau, real *restrict y);
 int mstmm_sweep_generic2_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
@@ -101,9 +104,9 @@ int mstmm_sweep_generic2_effort_slope(const real *restrict H, const real *restri
     const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
 int mstmm_sweep_generic2_complement_slope(const real *restrict H, const real *restrict d_H,
     real *restrict d_W);
-int mstmm_sweep_generic2_answered_slope(const real *restrict y, const real *restrict z,
+int mstmm_sweep_generic2_add_known_part_slope(const real *restrict y, const real *restrict z,
     const real *restrict d_y, const real *restrict d_z, real *restrict d_l);
-int mstmm_sweep_generic2_pull_slope(const real *restrict y, const real *restrict x,
+int mstmm_sweep_generic2_add_multiplier_effort_slope(const real *restrict y, const real *restrict x,
     const real *restrict d_y, const real *restrict d_x, real *restrict d_y_0);
 
 #ifndef MSTMM_TWO
@@ -2393,7 +2396,7 @@ static const mstmm_guard mstmm_sweep_generic2_factor_guards[] = {
  * out y[2] (N, N*m) tau - H^T e
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic2_push(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic2_column_load(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict G, const real *restrict e,
     const real *restrict tau, real *restrict y, real *restrict e_I)
 {
@@ -2531,13 +2534,13 @@ int mstmm_sweep_generic2_push(const real *restrict Rc, const real *restrict r,
     return 0;
 }
 
-static int mstmm_sweep_generic2_push_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic2_column_load_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic2_push(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]);
+    return mstmm_sweep_generic2_column_load(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic2_push_inputs[] = {
+static const mstmm_port mstmm_sweep_generic2_column_load_inputs[] = {
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"H", 12, "", 0, 0},
@@ -2546,7 +2549,7 @@ static const mstmm_port mstmm_sweep_generic2_push_inputs[] = {
     {"tau", 2, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic2_push_outputs[] = {
+static const mstmm_port mstmm_sweep_generic2_column_load_outputs[] = {
     {"y", 2, "N, N*m", 0, 0},
     {"e_I", 6, "N, N*m", 1, 0},
 };
@@ -2564,7 +2567,7 @@ static const mstmm_port mstmm_sweep_generic2_push_outputs[] = {
  * out udot[2] accelerations of the free coordinates
  * out delta[6] deviation of the body's acceleration, at P
  */
-int mstmm_sweep_generic2_answer(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic2_column_acceleration(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta)
 {
@@ -2675,13 +2678,13 @@ int mstmm_sweep_generic2_answer(const real *restrict Rc, const real *restrict r,
     return 0;
 }
 
-static int mstmm_sweep_generic2_answer_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic2_column_acceleration_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic2_answer(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
+    return mstmm_sweep_generic2_column_acceleration(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic2_answer_inputs[] = {
+static const mstmm_port mstmm_sweep_generic2_column_acceleration_inputs[] = {
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"H", 12, "", 0, 0},
@@ -2691,7 +2694,7 @@ static const mstmm_port mstmm_sweep_generic2_answer_inputs[] = {
     {"delta_I", 6, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic2_answer_outputs[] = {
+static const mstmm_port mstmm_sweep_generic2_column_acceleration_outputs[] = {
     {"udot", 2, "", 0, 0},
     {"delta", 6, "", 0, 0},
 };
@@ -4043,7 +4046,7 @@ static const mstmm_port mstmm_sweep_generic2_tangent_column_outputs[] = {
  * out theta[3] rotation of the body along the direction, body axes
  * out x[3] displacement of P along the direction, body axes
  */
-int mstmm_sweep_generic2_tangent_along(const real *restrict H, const real *restrict d_q,
+int mstmm_sweep_generic2_tangent_coordinate_change(const real *restrict H, const real *restrict d_q,
     real *restrict theta, real *restrict x)
 {
     const real t0 = H[6] * d_q[0];
@@ -4073,18 +4076,18 @@ int mstmm_sweep_generic2_tangent_along(const real *restrict H, const real *restr
     return 0;
 }
 
-static int mstmm_sweep_generic2_tangent_along_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic2_tangent_coordinate_change_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic2_tangent_along(in[0], in[1], out[0], out[1]);
+    return mstmm_sweep_generic2_tangent_coordinate_change(in[0], in[1], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic2_tangent_along_inputs[] = {
+static const mstmm_port mstmm_sweep_generic2_tangent_coordinate_change_inputs[] = {
     {"H", 12, "", 0, 0},
     {"d_q", 2, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic2_tangent_along_outputs[] = {
+static const mstmm_port mstmm_sweep_generic2_tangent_coordinate_change_outputs[] = {
     {"theta", 3, "", 0, 0},
     {"x", 3, "", 0, 0},
 };
@@ -4395,7 +4398,7 @@ static const mstmm_port mstmm_sweep_generic2_tangent_steady_outputs[] = {
  * out G[6] change of the carried load
  * out row[2] change of the rows by load, rotors and laws
  */
-int mstmm_sweep_generic2_tangent_turning(const real *restrict theta, const real *restrict H,
+int mstmm_sweep_generic2_tangent_rotational(const real *restrict theta, const real *restrict H,
     const real *restrict w, const real *restrict Q, const real *restrict f,
     const real *restrict d_u, const real *restrict d_s, const real *restrict J,
     const real *restrict laws, real *restrict B, real *restrict G, real *restrict row)
@@ -4517,13 +4520,13 @@ int mstmm_sweep_generic2_tangent_turning(const real *restrict theta, const real 
     return 0;
 }
 
-static int mstmm_sweep_generic2_tangent_turning_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic2_tangent_rotational_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic2_tangent_turning(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1], out[2]);
+    return mstmm_sweep_generic2_tangent_rotational(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1], out[2]);
 }
 
-static const mstmm_port mstmm_sweep_generic2_tangent_turning_inputs[] = {
+static const mstmm_port mstmm_sweep_generic2_tangent_rotational_inputs[] = {
     {"theta", 3, "", 0, 0},
     {"H", 12, "", 0, 0},
     {"w", 3, "", 0, 0},
@@ -4535,7 +4538,7 @@ static const mstmm_port mstmm_sweep_generic2_tangent_turning_inputs[] = {
     {"laws", 2, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic2_tangent_turning_outputs[] = {
+static const mstmm_port mstmm_sweep_generic2_tangent_rotational_outputs[] = {
     {"B", 9, "", 0, 0},
     {"G", 6, "", 0, 0},
     {"row", 2, "", 0, 0},
@@ -4827,7 +4830,7 @@ static const mstmm_port mstmm_sweep_generic2_tangent_reduce_outputs[] = {
  * out y[2] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic2_tangent_push(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic2_tangent_load(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict V, const real *restrict inverse,
     const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I)
 {
@@ -4973,13 +4976,13 @@ int mstmm_sweep_generic2_tangent_push(const real *restrict Rc, const real *restr
     return 0;
 }
 
-static int mstmm_sweep_generic2_tangent_push_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic2_tangent_load_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic2_tangent_push(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
+    return mstmm_sweep_generic2_tangent_load(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic2_tangent_push_inputs[] = {
+static const mstmm_port mstmm_sweep_generic2_tangent_load_inputs[] = {
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"H", 12, "", 0, 0},
@@ -4989,7 +4992,7 @@ static const mstmm_port mstmm_sweep_generic2_tangent_push_inputs[] = {
     {"e_f", 2, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic2_tangent_push_outputs[] = {
+static const mstmm_port mstmm_sweep_generic2_tangent_load_outputs[] = {
     {"y", 2, "", 0, 0},
     {"e_I", 6, "N, N*m", 1, 0},
 };
@@ -5009,7 +5012,7 @@ static const mstmm_port mstmm_sweep_generic2_tangent_push_outputs[] = {
  * out x[2] unknowns
  * out z[9] change of the body's motion, own axes
  */
-int mstmm_sweep_generic2_tangent_answer(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic2_tangent_solution(const real *restrict Rc, const real *restrict r,
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, const real *restrict B, const real *restrict gain,
     const real *restrict y, real *restrict x, real *restrict z)
@@ -5226,13 +5229,13 @@ int mstmm_sweep_generic2_tangent_answer(const real *restrict Rc, const real *res
     return 0;
 }
 
-static int mstmm_sweep_generic2_tangent_answer_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic2_tangent_solution_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic2_tangent_answer(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1]);
+    return mstmm_sweep_generic2_tangent_solution(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic2_tangent_answer_inputs[] = {
+static const mstmm_port mstmm_sweep_generic2_tangent_solution_inputs[] = {
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"w_I", 3, "rad/s", 0, 0},
@@ -5244,7 +5247,7 @@ static const mstmm_port mstmm_sweep_generic2_tangent_answer_inputs[] = {
     {"y", 2, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic2_tangent_answer_outputs[] = {
+static const mstmm_port mstmm_sweep_generic2_tangent_solution_outputs[] = {
     {"x", 2, "", 0, 0},
     {"z", 9, "", 0, 0},
 };
@@ -5263,10 +5266,10 @@ static const mstmm_port mstmm_sweep_generic2_tangent_answer_outputs[] = {
  * out y[2] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic2_tangent_push_known(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict V, const real *restrict inverse,
-    const real *restrict e, const real *restrict e_f, const real *restrict e_b, real *restrict y,
-    real *restrict e_I)
+int mstmm_sweep_generic2_tangent_load_with_increments(const real *restrict Rc,
+    const real *restrict r, const real *restrict H, const real *restrict V,
+    const real *restrict inverse, const real *restrict e, const real *restrict e_f,
+    const real *restrict e_b, real *restrict y, real *restrict e_I)
 {
     const real t0 = H[0] * e[0];
     const real t1 = H[2] * e[1];
@@ -5416,13 +5419,13 @@ int mstmm_sweep_generic2_tangent_push_known(const real *restrict Rc, const real 
     return 0;
 }
 
-static int mstmm_sweep_generic2_tangent_push_known_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic2_tangent_load_with_increments_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic2_tangent_push_known(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1]);
+    return mstmm_sweep_generic2_tangent_load_with_increments(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic2_tangent_push_known_inputs[] = {
+static const mstmm_port mstmm_sweep_generic2_tangent_load_with_increments_inputs[] = {
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"H", 12, "", 0, 0},
@@ -5433,7 +5436,7 @@ static const mstmm_port mstmm_sweep_generic2_tangent_push_known_inputs[] = {
     {"e_b", 6, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic2_tangent_push_known_outputs[] = {
+static const mstmm_port mstmm_sweep_generic2_tangent_load_with_increments_outputs[] = {
     {"y", 2, "", 0, 0},
     {"e_I", 6, "N, N*m", 1, 0},
 };
@@ -5454,10 +5457,11 @@ static const mstmm_port mstmm_sweep_generic2_tangent_push_known_outputs[] = {
  * out x[2] unknowns
  * out z[9] change of the body's motion, own axes
  */
-int mstmm_sweep_generic2_tangent_answer_known(const real *restrict Rc, const real *restrict r,
-    const real *restrict w_I, const real *restrict v, const real *restrict w,
-    const real *restrict z_I, const real *restrict B, const real *restrict gain,
-    const real *restrict y, const real *restrict b, real *restrict x, real *restrict z)
+int mstmm_sweep_generic2_tangent_solution_with_increments(const real *restrict Rc,
+    const real *restrict r, const real *restrict w_I, const real *restrict v,
+    const real *restrict w, const real *restrict z_I, const real *restrict B,
+    const real *restrict gain, const real *restrict y, const real *restrict b, real *restrict x,
+    real *restrict z)
 {
     const real t0 = Rc[0] * z_I[0];
     const real t1 = Rc[3] * z_I[1];
@@ -5680,13 +5684,13 @@ int mstmm_sweep_generic2_tangent_answer_known(const real *restrict Rc, const rea
     return 0;
 }
 
-static int mstmm_sweep_generic2_tangent_answer_known_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic2_tangent_solution_with_increments_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic2_tangent_answer_known(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], out[0], out[1]);
+    return mstmm_sweep_generic2_tangent_solution_with_increments(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic2_tangent_answer_known_inputs[] = {
+static const mstmm_port mstmm_sweep_generic2_tangent_solution_with_increments_inputs[] = {
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"w_I", 3, "rad/s", 0, 0},
@@ -5699,7 +5703,7 @@ static const mstmm_port mstmm_sweep_generic2_tangent_answer_known_inputs[] = {
     {"b", 9, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic2_tangent_answer_known_outputs[] = {
+static const mstmm_port mstmm_sweep_generic2_tangent_solution_with_increments_outputs[] = {
     {"x", 2, "", 0, 0},
     {"z", 9, "", 0, 0},
 };
@@ -6095,7 +6099,8 @@ static const mstmm_port mstmm_sweep_generic2_couple_outputs[] = {
  * in  z[2] of the row
  * out l[1] known part of the row, added to what is there
  */
-int mstmm_sweep_generic2_answered(const real *restrict y, const real *restrict z, real *restrict l)
+int mstmm_sweep_generic2_add_known_part(const real *restrict y, const real *restrict z,
+    real *restrict l)
 {
     const real t0 = y[0] * z[0];
     const real t1 = y[1] * z[1];
@@ -6105,18 +6110,18 @@ int mstmm_sweep_generic2_answered(const real *restrict y, const real *restrict z
     return 0;
 }
 
-static int mstmm_sweep_generic2_answered_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic2_add_known_part_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic2_answered(in[0], in[1], out[0]);
+    return mstmm_sweep_generic2_add_known_part(in[0], in[1], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_generic2_answered_inputs[] = {
+static const mstmm_port mstmm_sweep_generic2_add_known_part_inputs[] = {
     {"y", 2, "", 0, 0},
     {"z", 2, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic2_answered_outputs[] = {
+static const mstmm_port mstmm_sweep_generic2_add_known_part_outputs[] = {
     {"l", 1, "", 1, 0},
 };
 
@@ -6127,7 +6132,8 @@ static const mstmm_port mstmm_sweep_generic2_answered_outputs[] = {
  * in  x[1] (N, N*m) multiplier
  * out y_0[2] tau - H^T e, added to what is there
  */
-int mstmm_sweep_generic2_pull(const real *restrict y, const real *restrict x, real *restrict y_0)
+int mstmm_sweep_generic2_add_multiplier_effort(const real *restrict y, const real *restrict x,
+    real *restrict y_0)
 {
     const real t0 = y[0] * x[0];
     y_0[0] += t0;
@@ -6136,18 +6142,18 @@ int mstmm_sweep_generic2_pull(const real *restrict y, const real *restrict x, re
     return 0;
 }
 
-static int mstmm_sweep_generic2_pull_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic2_add_multiplier_effort_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic2_pull(in[0], in[1], out[0]);
+    return mstmm_sweep_generic2_add_multiplier_effort(in[0], in[1], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_generic2_pull_inputs[] = {
+static const mstmm_port mstmm_sweep_generic2_add_multiplier_effort_inputs[] = {
     {"y", 2, "", 0, 0},
     {"x", 1, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic2_pull_outputs[] = {
+static const mstmm_port mstmm_sweep_generic2_add_multiplier_effort_outputs[] = {
     {"y_0", 2, "", 1, 0},
 };
 
@@ -6157,7 +6163,7 @@ static const mstmm_port mstmm_sweep_generic2_pull_outputs[] = {
  * in  udot[2] accelerations of the coordinates
  * out e[6] (N, N*m) force part of f = S a + e, at P
  */
-int mstmm_sweep_generic2_exerted(const real *restrict S, const real *restrict H,
+int mstmm_sweep_generic2_required_load(const real *restrict S, const real *restrict H,
     const real *restrict udot, real *restrict e)
 {
     const real t0 = S[0] * H[0];
@@ -6319,19 +6325,19 @@ int mstmm_sweep_generic2_exerted(const real *restrict S, const real *restrict H,
     return 0;
 }
 
-static int mstmm_sweep_generic2_exerted_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic2_required_load_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic2_exerted(in[0], in[1], in[2], out[0]);
+    return mstmm_sweep_generic2_required_load(in[0], in[1], in[2], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_generic2_exerted_inputs[] = {
+static const mstmm_port mstmm_sweep_generic2_required_load_inputs[] = {
     {"S", 21, "", 0, 0},
     {"H", 12, "", 0, 0},
     {"udot", 2, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic2_exerted_outputs[] = {
+static const mstmm_port mstmm_sweep_generic2_required_load_outputs[] = {
     {"e", 6, "N, N*m", 0, 0},
 };
 
@@ -6343,7 +6349,7 @@ static const mstmm_port mstmm_sweep_generic2_exerted_outputs[] = {
  * in  tau[2] (N, N*m) efforts of the right-hand side on the free coordinates
  * out y[2] (N, N*m) tau - H^T e
  */
-int mstmm_sweep_generic2_push_on_ground(const real *restrict H, const real *restrict e,
+int mstmm_sweep_generic2_ground_column_load(const real *restrict H, const real *restrict e,
     const real *restrict tau, real *restrict y)
 {
     const real t0 = H[0] * e[0];
@@ -6375,19 +6381,19 @@ int mstmm_sweep_generic2_push_on_ground(const real *restrict H, const real *rest
     return 0;
 }
 
-static int mstmm_sweep_generic2_push_on_ground_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic2_ground_column_load_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic2_push_on_ground(in[0], in[1], in[2], out[0]);
+    return mstmm_sweep_generic2_ground_column_load(in[0], in[1], in[2], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_generic2_push_on_ground_inputs[] = {
+static const mstmm_port mstmm_sweep_generic2_ground_column_load_inputs[] = {
     {"H", 12, "", 0, 0},
     {"e", 6, "N, N*m", 0, 0},
     {"tau", 2, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic2_push_on_ground_outputs[] = {
+static const mstmm_port mstmm_sweep_generic2_ground_column_load_outputs[] = {
     {"y", 2, "N, N*m", 0, 0},
 };
 
@@ -7715,7 +7721,7 @@ static const mstmm_port mstmm_sweep_generic2_complement_slope_outputs[] = {
     {"d_W", 36, "", 0, 0},
 };
 
-/* answered and its derivative along a direction
+/* add_known_part and its derivative along a direction
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  y[2] tau - H^T e
@@ -7724,7 +7730,7 @@ static const mstmm_port mstmm_sweep_generic2_complement_slope_outputs[] = {
  * in  d_z[2] derivative of z
  * out d_l[1] derivative of l, added to what is there
  */
-int mstmm_sweep_generic2_answered_slope(const real *restrict y, const real *restrict z,
+int mstmm_sweep_generic2_add_known_part_slope(const real *restrict y, const real *restrict z,
     const real *restrict d_y, const real *restrict d_z, real *restrict d_l)
 {
     const real t0 = z[1] * d_y[1];
@@ -7739,24 +7745,24 @@ int mstmm_sweep_generic2_answered_slope(const real *restrict y, const real *rest
     return 0;
 }
 
-static int mstmm_sweep_generic2_answered_slope_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic2_add_known_part_slope_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic2_answered_slope(in[0], in[1], in[2], in[3], out[0]);
+    return mstmm_sweep_generic2_add_known_part_slope(in[0], in[1], in[2], in[3], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_generic2_answered_slope_inputs[] = {
+static const mstmm_port mstmm_sweep_generic2_add_known_part_slope_inputs[] = {
     {"y", 2, "", 0, 0},
     {"z", 2, "", 0, 0},
     {"d_y", 2, "", 0, 0},
     {"d_z", 2, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic2_answered_slope_outputs[] = {
+static const mstmm_port mstmm_sweep_generic2_add_known_part_slope_outputs[] = {
     {"d_l", 1, "", 1, 0},
 };
 
-/* pull and its derivative along a direction
+/* add_multiplier_effort and its derivative along a direction
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  y[2] of the row
@@ -7765,7 +7771,7 @@ static const mstmm_port mstmm_sweep_generic2_answered_slope_outputs[] = {
  * in  d_x[1] (N, N*m) derivative of x
  * out d_y_0[2] derivative of y_0, added to what is there
  */
-int mstmm_sweep_generic2_pull_slope(const real *restrict y, const real *restrict x,
+int mstmm_sweep_generic2_add_multiplier_effort_slope(const real *restrict y, const real *restrict x,
     const real *restrict d_y, const real *restrict d_x, real *restrict d_y_0)
 {
     const real t0 = x[0] * d_y[0];
@@ -7779,20 +7785,20 @@ int mstmm_sweep_generic2_pull_slope(const real *restrict y, const real *restrict
     return 0;
 }
 
-static int mstmm_sweep_generic2_pull_slope_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic2_add_multiplier_effort_slope_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic2_pull_slope(in[0], in[1], in[2], in[3], out[0]);
+    return mstmm_sweep_generic2_add_multiplier_effort_slope(in[0], in[1], in[2], in[3], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_generic2_pull_slope_inputs[] = {
+static const mstmm_port mstmm_sweep_generic2_add_multiplier_effort_slope_inputs[] = {
     {"y", 2, "", 0, 0},
     {"x", 1, "N, N*m", 0, 0},
     {"d_y", 2, "", 0, 0},
     {"d_x", 1, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic2_pull_slope_outputs[] = {
+static const mstmm_port mstmm_sweep_generic2_add_multiplier_effort_slope_outputs[] = {
     {"d_y_0", 2, "", 1, 0},
 };
 
@@ -7870,26 +7876,26 @@ static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
         .guards = mstmm_sweep_generic2_factor_guards,
     },
     {
-        .name = "push",
-        .function = (void (*)(void))mstmm_sweep_generic2_push,
-        .call = mstmm_sweep_generic2_push_call,
+        .name = "column_load",
+        .function = (void (*)(void))mstmm_sweep_generic2_column_load,
+        .call = mstmm_sweep_generic2_column_load_call,
         .n_inputs = 6,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic2_push_inputs,
-        .outputs = mstmm_sweep_generic2_push_outputs,
-        .ir_hash = "41df2f4319793e386e6ef6c8f0278ca294a27f7c0541d57793d21dd95a0e2c53",
+        .inputs = mstmm_sweep_generic2_column_load_inputs,
+        .outputs = mstmm_sweep_generic2_column_load_outputs,
+        .ir_hash = "09b311b223e1f7259e3ea0d899f0116cb9f7b0aeb4ea3ab94874818cc9a5ebc1",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "answer",
-        .function = (void (*)(void))mstmm_sweep_generic2_answer,
-        .call = mstmm_sweep_generic2_answer_call,
+        .name = "column_acceleration",
+        .function = (void (*)(void))mstmm_sweep_generic2_column_acceleration,
+        .call = mstmm_sweep_generic2_column_acceleration_call,
         .n_inputs = 7,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic2_answer_inputs,
-        .outputs = mstmm_sweep_generic2_answer_outputs,
-        .ir_hash = "b2d4f024389fe634f80c1fae8357af354ebb884cf4d7553a076d291fa396500d",
+        .inputs = mstmm_sweep_generic2_column_acceleration_inputs,
+        .outputs = mstmm_sweep_generic2_column_acceleration_outputs,
+        .ir_hash = "d7587e63819d2f28e5e291931b5ec631a720f0ae65767fb32a5d0cadf22e971c",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -7930,14 +7936,14 @@ static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "tangent_along",
-        .function = (void (*)(void))mstmm_sweep_generic2_tangent_along,
-        .call = mstmm_sweep_generic2_tangent_along_call,
+        .name = "tangent_coordinate_change",
+        .function = (void (*)(void))mstmm_sweep_generic2_tangent_coordinate_change,
+        .call = mstmm_sweep_generic2_tangent_coordinate_change_call,
         .n_inputs = 2,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic2_tangent_along_inputs,
-        .outputs = mstmm_sweep_generic2_tangent_along_outputs,
-        .ir_hash = "395c6f1460445dcb0225c8bd04582beb849f1c7a98b670520532fc32097dac4a",
+        .inputs = mstmm_sweep_generic2_tangent_coordinate_change_inputs,
+        .outputs = mstmm_sweep_generic2_tangent_coordinate_change_outputs,
+        .ir_hash = "f898c9beeb1f25b2fa2da5b6585a5fc45e6bfe626ef1efe462c7229594ff294b",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -7954,14 +7960,14 @@ static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "tangent_turning",
-        .function = (void (*)(void))mstmm_sweep_generic2_tangent_turning,
-        .call = mstmm_sweep_generic2_tangent_turning_call,
+        .name = "tangent_rotational",
+        .function = (void (*)(void))mstmm_sweep_generic2_tangent_rotational,
+        .call = mstmm_sweep_generic2_tangent_rotational_call,
         .n_inputs = 9,
         .n_outputs = 3,
-        .inputs = mstmm_sweep_generic2_tangent_turning_inputs,
-        .outputs = mstmm_sweep_generic2_tangent_turning_outputs,
-        .ir_hash = "55e32894d9595e984a623e2666479f3917a4a92de6a818dbddb7646226505165",
+        .inputs = mstmm_sweep_generic2_tangent_rotational_inputs,
+        .outputs = mstmm_sweep_generic2_tangent_rotational_outputs,
+        .ir_hash = "781a2c4008a7e59b0c94d305b65f71ef78b6856eb07f58432e9f4b062c1985ba",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -7990,50 +7996,50 @@ static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "tangent_push",
-        .function = (void (*)(void))mstmm_sweep_generic2_tangent_push,
-        .call = mstmm_sweep_generic2_tangent_push_call,
+        .name = "tangent_load",
+        .function = (void (*)(void))mstmm_sweep_generic2_tangent_load,
+        .call = mstmm_sweep_generic2_tangent_load_call,
         .n_inputs = 7,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic2_tangent_push_inputs,
-        .outputs = mstmm_sweep_generic2_tangent_push_outputs,
-        .ir_hash = "1dccf910cadb489fb5b6461d3a069cb50210437fa747e6453139191c64f71504",
+        .inputs = mstmm_sweep_generic2_tangent_load_inputs,
+        .outputs = mstmm_sweep_generic2_tangent_load_outputs,
+        .ir_hash = "a3ccbea4761d56a235340588cb12e0530a1b9319fad1041ec9221d78e22fb52b",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "tangent_answer",
-        .function = (void (*)(void))mstmm_sweep_generic2_tangent_answer,
-        .call = mstmm_sweep_generic2_tangent_answer_call,
+        .name = "tangent_solution",
+        .function = (void (*)(void))mstmm_sweep_generic2_tangent_solution,
+        .call = mstmm_sweep_generic2_tangent_solution_call,
         .n_inputs = 9,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic2_tangent_answer_inputs,
-        .outputs = mstmm_sweep_generic2_tangent_answer_outputs,
-        .ir_hash = "c860bb778406f9742f9d900b74013ac710122fc61045a137d6a8a93c4f244903",
+        .inputs = mstmm_sweep_generic2_tangent_solution_inputs,
+        .outputs = mstmm_sweep_generic2_tangent_solution_outputs,
+        .ir_hash = "9c3805a0036a3d750c46db203c1e6506cd4149319c19af62f0f29db53abd5141",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "tangent_push_known",
-        .function = (void (*)(void))mstmm_sweep_generic2_tangent_push_known,
-        .call = mstmm_sweep_generic2_tangent_push_known_call,
+        .name = "tangent_load_with_increments",
+        .function = (void (*)(void))mstmm_sweep_generic2_tangent_load_with_increments,
+        .call = mstmm_sweep_generic2_tangent_load_with_increments_call,
         .n_inputs = 8,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic2_tangent_push_known_inputs,
-        .outputs = mstmm_sweep_generic2_tangent_push_known_outputs,
-        .ir_hash = "bbf81e9b83073535ed29abaca21d3f9021f040ea66fb9bbbeed4524e9cfa47e3",
+        .inputs = mstmm_sweep_generic2_tangent_load_with_increments_inputs,
+        .outputs = mstmm_sweep_generic2_tangent_load_with_increments_outputs,
+        .ir_hash = "6202899baa055af05f38011153ab3986623da74e4ad97f2031fa4ecfce6c3aea",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "tangent_answer_known",
-        .function = (void (*)(void))mstmm_sweep_generic2_tangent_answer_known,
-        .call = mstmm_sweep_generic2_tangent_answer_known_call,
+        .name = "tangent_solution_with_increments",
+        .function = (void (*)(void))mstmm_sweep_generic2_tangent_solution_with_increments,
+        .call = mstmm_sweep_generic2_tangent_solution_with_increments_call,
         .n_inputs = 10,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic2_tangent_answer_known_inputs,
-        .outputs = mstmm_sweep_generic2_tangent_answer_known_outputs,
-        .ir_hash = "324269c09ea01a8f3fee895cea619b08b432089e9314064c09eecfed5d10ec95",
+        .inputs = mstmm_sweep_generic2_tangent_solution_with_increments_inputs,
+        .outputs = mstmm_sweep_generic2_tangent_solution_with_increments_outputs,
+        .ir_hash = "02d375ff13c073c7cb977ee9bbcdd9496114adb54c80e14e31a358aa19af6df9",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -8074,50 +8080,50 @@ static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "answered",
-        .function = (void (*)(void))mstmm_sweep_generic2_answered,
-        .call = mstmm_sweep_generic2_answered_call,
+        .name = "add_known_part",
+        .function = (void (*)(void))mstmm_sweep_generic2_add_known_part,
+        .call = mstmm_sweep_generic2_add_known_part_call,
         .n_inputs = 2,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_generic2_answered_inputs,
-        .outputs = mstmm_sweep_generic2_answered_outputs,
-        .ir_hash = "e6d4688144d1a6956c391d05ebe982aa2ff6574425df199955716130d682c433",
+        .inputs = mstmm_sweep_generic2_add_known_part_inputs,
+        .outputs = mstmm_sweep_generic2_add_known_part_outputs,
+        .ir_hash = "bb2460bf020973365ec6434b3f1e44104b8065b1ee1d4424a377a054f3f06acd",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "pull",
-        .function = (void (*)(void))mstmm_sweep_generic2_pull,
-        .call = mstmm_sweep_generic2_pull_call,
+        .name = "add_multiplier_effort",
+        .function = (void (*)(void))mstmm_sweep_generic2_add_multiplier_effort,
+        .call = mstmm_sweep_generic2_add_multiplier_effort_call,
         .n_inputs = 2,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_generic2_pull_inputs,
-        .outputs = mstmm_sweep_generic2_pull_outputs,
-        .ir_hash = "39b23cc9ae2506bf062c0107cfa3955bff10b497cc5c24c6e56198ca96388c92",
+        .inputs = mstmm_sweep_generic2_add_multiplier_effort_inputs,
+        .outputs = mstmm_sweep_generic2_add_multiplier_effort_outputs,
+        .ir_hash = "7034f3fdb4c876a38240f978e280b25e9d90dc79c4f0573ae2bfc658af26d9a2",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "exerted",
-        .function = (void (*)(void))mstmm_sweep_generic2_exerted,
-        .call = mstmm_sweep_generic2_exerted_call,
+        .name = "required_load",
+        .function = (void (*)(void))mstmm_sweep_generic2_required_load,
+        .call = mstmm_sweep_generic2_required_load_call,
         .n_inputs = 3,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_generic2_exerted_inputs,
-        .outputs = mstmm_sweep_generic2_exerted_outputs,
-        .ir_hash = "a73aaedc1404c5b8491ef5fe781ceced4c98216f68f8df8b7a03eaf77d73ee4e",
+        .inputs = mstmm_sweep_generic2_required_load_inputs,
+        .outputs = mstmm_sweep_generic2_required_load_outputs,
+        .ir_hash = "718b414f7c13fc8ff7c009a5b01999e7643819216da017ba9c5f0c75c40f622b",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "push_on_ground",
-        .function = (void (*)(void))mstmm_sweep_generic2_push_on_ground,
-        .call = mstmm_sweep_generic2_push_on_ground_call,
+        .name = "ground_column_load",
+        .function = (void (*)(void))mstmm_sweep_generic2_ground_column_load,
+        .call = mstmm_sweep_generic2_ground_column_load_call,
         .n_inputs = 3,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_generic2_push_on_ground_inputs,
-        .outputs = mstmm_sweep_generic2_push_on_ground_outputs,
-        .ir_hash = "163a24bad65f458d9df70e4002f6790ac78a0b1f08eb69c3b4bd63bb0b74c7aa",
+        .inputs = mstmm_sweep_generic2_ground_column_load_inputs,
+        .outputs = mstmm_sweep_generic2_ground_column_load_outputs,
+        .ir_hash = "276fb1081d589e5f4d460a5c5aa97bd15535bfda577a2fe7d48fa03055394cbe",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -8158,26 +8164,26 @@ static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "answered_slope",
-        .function = (void (*)(void))mstmm_sweep_generic2_answered_slope,
-        .call = mstmm_sweep_generic2_answered_slope_call,
+        .name = "add_known_part_slope",
+        .function = (void (*)(void))mstmm_sweep_generic2_add_known_part_slope,
+        .call = mstmm_sweep_generic2_add_known_part_slope_call,
         .n_inputs = 4,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_generic2_answered_slope_inputs,
-        .outputs = mstmm_sweep_generic2_answered_slope_outputs,
-        .ir_hash = "21fb2a8d27fa9c13c7612fb0d15a2cf2b6344abc78cffb5e3d927027fff4283c",
+        .inputs = mstmm_sweep_generic2_add_known_part_slope_inputs,
+        .outputs = mstmm_sweep_generic2_add_known_part_slope_outputs,
+        .ir_hash = "1946d03265736f4a86b4bc991cfa9244e9354eb11e196e5ff13c80196e6bd32f",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "pull_slope",
-        .function = (void (*)(void))mstmm_sweep_generic2_pull_slope,
-        .call = mstmm_sweep_generic2_pull_slope_call,
+        .name = "add_multiplier_effort_slope",
+        .function = (void (*)(void))mstmm_sweep_generic2_add_multiplier_effort_slope,
+        .call = mstmm_sweep_generic2_add_multiplier_effort_slope_call,
         .n_inputs = 4,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_generic2_pull_slope_inputs,
-        .outputs = mstmm_sweep_generic2_pull_slope_outputs,
-        .ir_hash = "8008683b6fec47e359c459b126751205dcfbca72876b8d0e5754ebbe423df5b6",
+        .inputs = mstmm_sweep_generic2_add_multiplier_effort_slope_inputs,
+        .outputs = mstmm_sweep_generic2_add_multiplier_effort_slope_outputs,
+        .ir_hash = "5aa1db7ebba055ecca216bfa485b969ac0b500f89baa35a992a247b51581b683",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -8187,7 +8193,7 @@ const mstmm_element mstmm_sweep_generic2 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic2",
-    .hash = "a0216929862b569f5f5e4e81089232b8ce36c52fb13327f33ddb07a792e65805",
+    .hash = "046e2c55a8776c078dfc0aebf9f186f1bd419b6dcc4ef300d657c0e38d68630c",
     .nq = 0,
     .nu = 0,
     .np = 0,

@@ -30,10 +30,10 @@ int mstmm_sweep_generic3_factor(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict J, const real *restrict W,
     const real *restrict floor_, const real *restrict S, real *restrict F, real *restrict G,
     real *restrict S_I);
-int mstmm_sweep_generic3_push(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic3_column_load(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict G, const real *restrict e,
     const real *restrict tau, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic3_answer(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic3_column_acceleration(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_sweep_generic3_qr_eliminate(const real *restrict H, const real *restrict J,
@@ -49,14 +49,14 @@ int mstmm_sweep_generic3_tangent_column(const real *restrict theta, const real *
     const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
     const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
     real *restrict G, real *restrict row);
-int mstmm_sweep_generic3_tangent_along(const real *restrict H, const real *restrict d_q,
+int mstmm_sweep_generic3_tangent_coordinate_change(const real *restrict H, const real *restrict d_q,
     real *restrict theta, real *restrict x);
 int mstmm_sweep_generic3_tangent_steady(const real *restrict theta, const real *restrict x,
     const real *restrict H, const real *restrict v, const real *restrict w, const real *restrict Q,
     const real *restrict f, const real *restrict d_u, const real *restrict d_s,
     const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
     real *restrict row);
-int mstmm_sweep_generic3_tangent_turning(const real *restrict theta, const real *restrict H,
+int mstmm_sweep_generic3_tangent_rotational(const real *restrict theta, const real *restrict H,
     const real *restrict w, const real *restrict Q, const real *restrict f,
     const real *restrict d_u, const real *restrict d_s, const real *restrict J,
     const real *restrict laws, real *restrict B, real *restrict G, real *restrict row);
@@ -66,29 +66,32 @@ int mstmm_sweep_generic3_tangent_rows(const real *restrict H, const real *restri
 int mstmm_sweep_generic3_tangent_reduce(const real *restrict inverse, const real *restrict right,
     const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
     real *restrict S);
-int mstmm_sweep_generic3_tangent_push(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic3_tangent_load(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict V, const real *restrict inverse,
     const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic3_tangent_answer(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic3_tangent_solution(const real *restrict Rc, const real *restrict r,
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, const real *restrict B, const real *restrict gain,
     const real *restrict y, real *restrict x, real *restrict z);
-int mstmm_sweep_generic3_tangent_push_known(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict V, const real *restrict inverse,
-    const real *restrict e, const real *restrict e_f, const real *restrict e_b, real *restrict y,
-    real *restrict e_I);
-int mstmm_sweep_generic3_tangent_answer_known(const real *restrict Rc, const real *restrict r,
-    const real *restrict w_I, const real *restrict v, const real *restrict w,
-    const real *restrict z_I, const real *restrict B, const real *restrict gain,
-    const real *restrict y, const real *restrict b, real *restrict x, real *restrict z);
+int mstmm_sweep_generic3_tangent_load_with_increments(const real *restrict Rc,
+    const real *restrict r, const real *restrict H, const real *restrict V,
+    const real *restrict inverse, const real *restrict e, const real *restrict e_f,
+    const real *restrict e_b, real *restrict y, real *restrict e_I);
+int mstmm_sweep_generic3_tangent_solution_with_increments(const real *restrict Rc,
+    const real *restrict r, const real *restrict w_I, const real *restrict v,
+    const real *restrict w, const real *restrict z_I, const real *restrict B,
+    const real *restrict gain, const real *restrict y, const real *restrict b, real *restrict x,
+    real *restrict z);
 int mstmm_sweep_generic3_complement(const real *restrict H, real *restrict W);
 int mstmm_sweep_generic3_divide(const real *restrict F, const real *restrict y, real *restrict z);
 int mstmm_sweep_generic3_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
-int mstmm_sweep_generic3_answered(const real *restrict y, const real *restrict z, real *restrict l);
-int mstmm_sweep_generic3_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
-int mstmm_sweep_generic3_exerted(const real *restrict S, const real *restrict H,
+int mstmm_sweep_generic3_add_known_part(const real *restrict y, const real *restrict z,
+    real *restrict l);
+int mstmm_sweep_generic3_add_multiplier_effort(const real *restrict y, const real *restrict x,
+    real *restrict y_0);
+int mstmm_sweep_generic3_required_load(const real *restrict S, const real *restrict H,
     const real *restrict udot, real *restrict e);
-int mstmm_sweep_generic3_push_on_ground(const real *restrict H, const real *restrict e,
+int mstmm_sweep_generic3_ground_column_load(const real *restrict H, const real *restrict e,
     const real *restrict tau, real *restrict y);
 int mstmm_sweep_generic3_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
@@ -101,9 +104,9 @@ int mstmm_sweep_generic3_effort_slope(const real *restrict H, const real *restri
     const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
 int mstmm_sweep_generic3_complement_slope(const real *restrict H, const real *restrict d_H,
     real *restrict d_W);
-int mstmm_sweep_generic3_answered_slope(const real *restrict y, const real *restrict z,
+int mstmm_sweep_generic3_add_known_part_slope(const real *restrict y, const real *restrict z,
     const real *restrict d_y, const real *restrict d_z, real *restrict d_l);
-int mstmm_sweep_generic3_pull_slope(const real *restrict y, const real *restrict x,
+int mstmm_sweep_generic3_add_multiplier_effort_slope(const real *restrict y, const real *restrict x,
     const real *restrict d_y, const real *restrict d_x, real *restrict d_y_0);
 
 #ifndef MSTMM_TWO
@@ -3019,7 +3022,7 @@ static const mstmm_guard mstmm_sweep_generic3_factor_guards[] = {
  * out y[3] (N, N*m) tau - H^T e
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic3_push(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic3_column_load(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict G, const real *restrict e,
     const real *restrict tau, real *restrict y, real *restrict e_I)
 {
@@ -3182,13 +3185,13 @@ int mstmm_sweep_generic3_push(const real *restrict Rc, const real *restrict r,
     return 0;
 }
 
-static int mstmm_sweep_generic3_push_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic3_column_load_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic3_push(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]);
+    return mstmm_sweep_generic3_column_load(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic3_push_inputs[] = {
+static const mstmm_port mstmm_sweep_generic3_column_load_inputs[] = {
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"H", 18, "", 0, 0},
@@ -3197,7 +3200,7 @@ static const mstmm_port mstmm_sweep_generic3_push_inputs[] = {
     {"tau", 3, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic3_push_outputs[] = {
+static const mstmm_port mstmm_sweep_generic3_column_load_outputs[] = {
     {"y", 3, "N, N*m", 0, 0},
     {"e_I", 6, "N, N*m", 1, 0},
 };
@@ -3215,7 +3218,7 @@ static const mstmm_port mstmm_sweep_generic3_push_outputs[] = {
  * out udot[3] accelerations of the free coordinates
  * out delta[6] deviation of the body's acceleration, at P
  */
-int mstmm_sweep_generic3_answer(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic3_column_acceleration(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta)
 {
@@ -3360,13 +3363,13 @@ int mstmm_sweep_generic3_answer(const real *restrict Rc, const real *restrict r,
     return 0;
 }
 
-static int mstmm_sweep_generic3_answer_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic3_column_acceleration_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic3_answer(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
+    return mstmm_sweep_generic3_column_acceleration(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic3_answer_inputs[] = {
+static const mstmm_port mstmm_sweep_generic3_column_acceleration_inputs[] = {
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"H", 18, "", 0, 0},
@@ -3376,7 +3379,7 @@ static const mstmm_port mstmm_sweep_generic3_answer_inputs[] = {
     {"delta_I", 6, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic3_answer_outputs[] = {
+static const mstmm_port mstmm_sweep_generic3_column_acceleration_outputs[] = {
     {"udot", 3, "", 0, 0},
     {"delta", 6, "", 0, 0},
 };
@@ -5190,7 +5193,7 @@ static const mstmm_port mstmm_sweep_generic3_tangent_column_outputs[] = {
  * out theta[3] rotation of the body along the direction, body axes
  * out x[3] displacement of P along the direction, body axes
  */
-int mstmm_sweep_generic3_tangent_along(const real *restrict H, const real *restrict d_q,
+int mstmm_sweep_generic3_tangent_coordinate_change(const real *restrict H, const real *restrict d_q,
     real *restrict theta, real *restrict x)
 {
     const real t0 = H[9] * d_q[0];
@@ -5232,18 +5235,18 @@ int mstmm_sweep_generic3_tangent_along(const real *restrict H, const real *restr
     return 0;
 }
 
-static int mstmm_sweep_generic3_tangent_along_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic3_tangent_coordinate_change_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic3_tangent_along(in[0], in[1], out[0], out[1]);
+    return mstmm_sweep_generic3_tangent_coordinate_change(in[0], in[1], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic3_tangent_along_inputs[] = {
+static const mstmm_port mstmm_sweep_generic3_tangent_coordinate_change_inputs[] = {
     {"H", 18, "", 0, 0},
     {"d_q", 3, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic3_tangent_along_outputs[] = {
+static const mstmm_port mstmm_sweep_generic3_tangent_coordinate_change_outputs[] = {
     {"theta", 3, "", 0, 0},
     {"x", 3, "", 0, 0},
 };
@@ -5581,7 +5584,7 @@ static const mstmm_port mstmm_sweep_generic3_tangent_steady_outputs[] = {
  * out G[6] change of the carried load
  * out row[3] change of the rows by load, rotors and laws
  */
-int mstmm_sweep_generic3_tangent_turning(const real *restrict theta, const real *restrict H,
+int mstmm_sweep_generic3_tangent_rotational(const real *restrict theta, const real *restrict H,
     const real *restrict w, const real *restrict Q, const real *restrict f,
     const real *restrict d_u, const real *restrict d_s, const real *restrict J,
     const real *restrict laws, real *restrict B, real *restrict G, real *restrict row)
@@ -5718,13 +5721,13 @@ int mstmm_sweep_generic3_tangent_turning(const real *restrict theta, const real 
     return 0;
 }
 
-static int mstmm_sweep_generic3_tangent_turning_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic3_tangent_rotational_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic3_tangent_turning(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1], out[2]);
+    return mstmm_sweep_generic3_tangent_rotational(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1], out[2]);
 }
 
-static const mstmm_port mstmm_sweep_generic3_tangent_turning_inputs[] = {
+static const mstmm_port mstmm_sweep_generic3_tangent_rotational_inputs[] = {
     {"theta", 3, "", 0, 0},
     {"H", 18, "", 0, 0},
     {"w", 3, "", 0, 0},
@@ -5736,7 +5739,7 @@ static const mstmm_port mstmm_sweep_generic3_tangent_turning_inputs[] = {
     {"laws", 3, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic3_tangent_turning_outputs[] = {
+static const mstmm_port mstmm_sweep_generic3_tangent_rotational_outputs[] = {
     {"B", 9, "", 0, 0},
     {"G", 6, "", 0, 0},
     {"row", 3, "", 0, 0},
@@ -6162,7 +6165,7 @@ static const mstmm_port mstmm_sweep_generic3_tangent_reduce_outputs[] = {
  * out y[3] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic3_tangent_push(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic3_tangent_load(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict V, const real *restrict inverse,
     const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I)
 {
@@ -6343,13 +6346,13 @@ int mstmm_sweep_generic3_tangent_push(const real *restrict Rc, const real *restr
     return 0;
 }
 
-static int mstmm_sweep_generic3_tangent_push_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic3_tangent_load_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic3_tangent_push(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
+    return mstmm_sweep_generic3_tangent_load(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic3_tangent_push_inputs[] = {
+static const mstmm_port mstmm_sweep_generic3_tangent_load_inputs[] = {
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"H", 18, "", 0, 0},
@@ -6359,7 +6362,7 @@ static const mstmm_port mstmm_sweep_generic3_tangent_push_inputs[] = {
     {"e_f", 3, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic3_tangent_push_outputs[] = {
+static const mstmm_port mstmm_sweep_generic3_tangent_load_outputs[] = {
     {"y", 3, "", 0, 0},
     {"e_I", 6, "N, N*m", 1, 0},
 };
@@ -6379,7 +6382,7 @@ static const mstmm_port mstmm_sweep_generic3_tangent_push_outputs[] = {
  * out x[3] unknowns
  * out z[9] change of the body's motion, own axes
  */
-int mstmm_sweep_generic3_tangent_answer(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic3_tangent_solution(const real *restrict Rc, const real *restrict r,
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, const real *restrict B, const real *restrict gain,
     const real *restrict y, real *restrict x, real *restrict z)
@@ -6633,13 +6636,13 @@ int mstmm_sweep_generic3_tangent_answer(const real *restrict Rc, const real *res
     return 0;
 }
 
-static int mstmm_sweep_generic3_tangent_answer_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic3_tangent_solution_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic3_tangent_answer(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1]);
+    return mstmm_sweep_generic3_tangent_solution(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic3_tangent_answer_inputs[] = {
+static const mstmm_port mstmm_sweep_generic3_tangent_solution_inputs[] = {
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"w_I", 3, "rad/s", 0, 0},
@@ -6651,7 +6654,7 @@ static const mstmm_port mstmm_sweep_generic3_tangent_answer_inputs[] = {
     {"y", 3, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic3_tangent_answer_outputs[] = {
+static const mstmm_port mstmm_sweep_generic3_tangent_solution_outputs[] = {
     {"x", 3, "", 0, 0},
     {"z", 9, "", 0, 0},
 };
@@ -6670,10 +6673,10 @@ static const mstmm_port mstmm_sweep_generic3_tangent_answer_outputs[] = {
  * out y[3] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic3_tangent_push_known(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict V, const real *restrict inverse,
-    const real *restrict e, const real *restrict e_f, const real *restrict e_b, real *restrict y,
-    real *restrict e_I)
+int mstmm_sweep_generic3_tangent_load_with_increments(const real *restrict Rc,
+    const real *restrict r, const real *restrict H, const real *restrict V,
+    const real *restrict inverse, const real *restrict e, const real *restrict e_f,
+    const real *restrict e_b, real *restrict y, real *restrict e_I)
 {
     const real t0 = H[0] * e[0];
     const real t1 = H[3] * e[1];
@@ -6858,13 +6861,13 @@ int mstmm_sweep_generic3_tangent_push_known(const real *restrict Rc, const real 
     return 0;
 }
 
-static int mstmm_sweep_generic3_tangent_push_known_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic3_tangent_load_with_increments_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic3_tangent_push_known(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1]);
+    return mstmm_sweep_generic3_tangent_load_with_increments(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic3_tangent_push_known_inputs[] = {
+static const mstmm_port mstmm_sweep_generic3_tangent_load_with_increments_inputs[] = {
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"H", 18, "", 0, 0},
@@ -6875,7 +6878,7 @@ static const mstmm_port mstmm_sweep_generic3_tangent_push_known_inputs[] = {
     {"e_b", 6, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic3_tangent_push_known_outputs[] = {
+static const mstmm_port mstmm_sweep_generic3_tangent_load_with_increments_outputs[] = {
     {"y", 3, "", 0, 0},
     {"e_I", 6, "N, N*m", 1, 0},
 };
@@ -6896,10 +6899,11 @@ static const mstmm_port mstmm_sweep_generic3_tangent_push_known_outputs[] = {
  * out x[3] unknowns
  * out z[9] change of the body's motion, own axes
  */
-int mstmm_sweep_generic3_tangent_answer_known(const real *restrict Rc, const real *restrict r,
-    const real *restrict w_I, const real *restrict v, const real *restrict w,
-    const real *restrict z_I, const real *restrict B, const real *restrict gain,
-    const real *restrict y, const real *restrict b, real *restrict x, real *restrict z)
+int mstmm_sweep_generic3_tangent_solution_with_increments(const real *restrict Rc,
+    const real *restrict r, const real *restrict w_I, const real *restrict v,
+    const real *restrict w, const real *restrict z_I, const real *restrict B,
+    const real *restrict gain, const real *restrict y, const real *restrict b, real *restrict x,
+    real *restrict z)
 {
     const real t0 = Rc[0] * z_I[0];
     const real t1 = Rc[3] * z_I[1];
@@ -7159,13 +7163,13 @@ int mstmm_sweep_generic3_tangent_answer_known(const real *restrict Rc, const rea
     return 0;
 }
 
-static int mstmm_sweep_generic3_tangent_answer_known_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic3_tangent_solution_with_increments_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic3_tangent_answer_known(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], out[0], out[1]);
+    return mstmm_sweep_generic3_tangent_solution_with_increments(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic3_tangent_answer_known_inputs[] = {
+static const mstmm_port mstmm_sweep_generic3_tangent_solution_with_increments_inputs[] = {
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"w_I", 3, "rad/s", 0, 0},
@@ -7178,7 +7182,7 @@ static const mstmm_port mstmm_sweep_generic3_tangent_answer_known_inputs[] = {
     {"b", 9, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic3_tangent_answer_known_outputs[] = {
+static const mstmm_port mstmm_sweep_generic3_tangent_solution_with_increments_outputs[] = {
     {"x", 3, "", 0, 0},
     {"z", 9, "", 0, 0},
 };
@@ -7757,7 +7761,8 @@ static const mstmm_port mstmm_sweep_generic3_couple_outputs[] = {
  * in  z[3] of the row
  * out l[1] known part of the row, added to what is there
  */
-int mstmm_sweep_generic3_answered(const real *restrict y, const real *restrict z, real *restrict l)
+int mstmm_sweep_generic3_add_known_part(const real *restrict y, const real *restrict z,
+    real *restrict l)
 {
     const real t0 = y[0] * z[0];
     const real t1 = y[1] * z[1];
@@ -7769,18 +7774,18 @@ int mstmm_sweep_generic3_answered(const real *restrict y, const real *restrict z
     return 0;
 }
 
-static int mstmm_sweep_generic3_answered_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic3_add_known_part_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic3_answered(in[0], in[1], out[0]);
+    return mstmm_sweep_generic3_add_known_part(in[0], in[1], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_generic3_answered_inputs[] = {
+static const mstmm_port mstmm_sweep_generic3_add_known_part_inputs[] = {
     {"y", 3, "", 0, 0},
     {"z", 3, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic3_answered_outputs[] = {
+static const mstmm_port mstmm_sweep_generic3_add_known_part_outputs[] = {
     {"l", 1, "", 1, 0},
 };
 
@@ -7791,7 +7796,8 @@ static const mstmm_port mstmm_sweep_generic3_answered_outputs[] = {
  * in  x[1] (N, N*m) multiplier
  * out y_0[3] tau - H^T e, added to what is there
  */
-int mstmm_sweep_generic3_pull(const real *restrict y, const real *restrict x, real *restrict y_0)
+int mstmm_sweep_generic3_add_multiplier_effort(const real *restrict y, const real *restrict x,
+    real *restrict y_0)
 {
     const real t0 = y[0] * x[0];
     y_0[0] += t0;
@@ -7802,18 +7808,18 @@ int mstmm_sweep_generic3_pull(const real *restrict y, const real *restrict x, re
     return 0;
 }
 
-static int mstmm_sweep_generic3_pull_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic3_add_multiplier_effort_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic3_pull(in[0], in[1], out[0]);
+    return mstmm_sweep_generic3_add_multiplier_effort(in[0], in[1], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_generic3_pull_inputs[] = {
+static const mstmm_port mstmm_sweep_generic3_add_multiplier_effort_inputs[] = {
     {"y", 3, "", 0, 0},
     {"x", 1, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic3_pull_outputs[] = {
+static const mstmm_port mstmm_sweep_generic3_add_multiplier_effort_outputs[] = {
     {"y_0", 3, "", 1, 0},
 };
 
@@ -7823,7 +7829,7 @@ static const mstmm_port mstmm_sweep_generic3_pull_outputs[] = {
  * in  udot[3] accelerations of the coordinates
  * out e[6] (N, N*m) force part of f = S a + e, at P
  */
-int mstmm_sweep_generic3_exerted(const real *restrict S, const real *restrict H,
+int mstmm_sweep_generic3_required_load(const real *restrict S, const real *restrict H,
     const real *restrict udot, real *restrict e)
 {
     const real t0 = S[0] * H[0];
@@ -8063,19 +8069,19 @@ int mstmm_sweep_generic3_exerted(const real *restrict S, const real *restrict H,
     return 0;
 }
 
-static int mstmm_sweep_generic3_exerted_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic3_required_load_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic3_exerted(in[0], in[1], in[2], out[0]);
+    return mstmm_sweep_generic3_required_load(in[0], in[1], in[2], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_generic3_exerted_inputs[] = {
+static const mstmm_port mstmm_sweep_generic3_required_load_inputs[] = {
     {"S", 21, "", 0, 0},
     {"H", 18, "", 0, 0},
     {"udot", 3, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic3_exerted_outputs[] = {
+static const mstmm_port mstmm_sweep_generic3_required_load_outputs[] = {
     {"e", 6, "N, N*m", 0, 0},
 };
 
@@ -8087,7 +8093,7 @@ static const mstmm_port mstmm_sweep_generic3_exerted_outputs[] = {
  * in  tau[3] (N, N*m) efforts of the right-hand side on the free coordinates
  * out y[3] (N, N*m) tau - H^T e
  */
-int mstmm_sweep_generic3_push_on_ground(const real *restrict H, const real *restrict e,
+int mstmm_sweep_generic3_ground_column_load(const real *restrict H, const real *restrict e,
     const real *restrict tau, real *restrict y)
 {
     const real t0 = H[0] * e[0];
@@ -8132,19 +8138,19 @@ int mstmm_sweep_generic3_push_on_ground(const real *restrict H, const real *rest
     return 0;
 }
 
-static int mstmm_sweep_generic3_push_on_ground_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic3_ground_column_load_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic3_push_on_ground(in[0], in[1], in[2], out[0]);
+    return mstmm_sweep_generic3_ground_column_load(in[0], in[1], in[2], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_generic3_push_on_ground_inputs[] = {
+static const mstmm_port mstmm_sweep_generic3_ground_column_load_inputs[] = {
     {"H", 18, "", 0, 0},
     {"e", 6, "N, N*m", 0, 0},
     {"tau", 3, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic3_push_on_ground_outputs[] = {
+static const mstmm_port mstmm_sweep_generic3_ground_column_load_outputs[] = {
     {"y", 3, "N, N*m", 0, 0},
 };
 
@@ -10025,7 +10031,7 @@ static const mstmm_port mstmm_sweep_generic3_complement_slope_outputs[] = {
     {"d_W", 36, "", 0, 0},
 };
 
-/* answered and its derivative along a direction
+/* add_known_part and its derivative along a direction
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  y[3] tau - H^T e
@@ -10034,7 +10040,7 @@ static const mstmm_port mstmm_sweep_generic3_complement_slope_outputs[] = {
  * in  d_z[3] derivative of z
  * out d_l[1] derivative of l, added to what is there
  */
-int mstmm_sweep_generic3_answered_slope(const real *restrict y, const real *restrict z,
+int mstmm_sweep_generic3_add_known_part_slope(const real *restrict y, const real *restrict z,
     const real *restrict d_y, const real *restrict d_z, real *restrict d_l)
 {
     const real t0 = z[2] * d_y[2];
@@ -10053,24 +10059,24 @@ int mstmm_sweep_generic3_answered_slope(const real *restrict y, const real *rest
     return 0;
 }
 
-static int mstmm_sweep_generic3_answered_slope_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic3_add_known_part_slope_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic3_answered_slope(in[0], in[1], in[2], in[3], out[0]);
+    return mstmm_sweep_generic3_add_known_part_slope(in[0], in[1], in[2], in[3], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_generic3_answered_slope_inputs[] = {
+static const mstmm_port mstmm_sweep_generic3_add_known_part_slope_inputs[] = {
     {"y", 3, "", 0, 0},
     {"z", 3, "", 0, 0},
     {"d_y", 3, "", 0, 0},
     {"d_z", 3, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic3_answered_slope_outputs[] = {
+static const mstmm_port mstmm_sweep_generic3_add_known_part_slope_outputs[] = {
     {"d_l", 1, "", 1, 0},
 };
 
-/* pull and its derivative along a direction
+/* add_multiplier_effort and its derivative along a direction
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  y[3] of the row
@@ -10079,7 +10085,7 @@ static const mstmm_port mstmm_sweep_generic3_answered_slope_outputs[] = {
  * in  d_x[1] (N, N*m) derivative of x
  * out d_y_0[3] derivative of y_0, added to what is there
  */
-int mstmm_sweep_generic3_pull_slope(const real *restrict y, const real *restrict x,
+int mstmm_sweep_generic3_add_multiplier_effort_slope(const real *restrict y, const real *restrict x,
     const real *restrict d_y, const real *restrict d_x, real *restrict d_y_0)
 {
     const real t0 = x[0] * d_y[0];
@@ -10097,20 +10103,20 @@ int mstmm_sweep_generic3_pull_slope(const real *restrict y, const real *restrict
     return 0;
 }
 
-static int mstmm_sweep_generic3_pull_slope_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic3_add_multiplier_effort_slope_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic3_pull_slope(in[0], in[1], in[2], in[3], out[0]);
+    return mstmm_sweep_generic3_add_multiplier_effort_slope(in[0], in[1], in[2], in[3], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_generic3_pull_slope_inputs[] = {
+static const mstmm_port mstmm_sweep_generic3_add_multiplier_effort_slope_inputs[] = {
     {"y", 3, "", 0, 0},
     {"x", 1, "N, N*m", 0, 0},
     {"d_y", 3, "", 0, 0},
     {"d_x", 1, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic3_pull_slope_outputs[] = {
+static const mstmm_port mstmm_sweep_generic3_add_multiplier_effort_slope_outputs[] = {
     {"d_y_0", 3, "", 1, 0},
 };
 
@@ -10188,26 +10194,26 @@ static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
         .guards = mstmm_sweep_generic3_factor_guards,
     },
     {
-        .name = "push",
-        .function = (void (*)(void))mstmm_sweep_generic3_push,
-        .call = mstmm_sweep_generic3_push_call,
+        .name = "column_load",
+        .function = (void (*)(void))mstmm_sweep_generic3_column_load,
+        .call = mstmm_sweep_generic3_column_load_call,
         .n_inputs = 6,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic3_push_inputs,
-        .outputs = mstmm_sweep_generic3_push_outputs,
-        .ir_hash = "5aadfe88faa405b6f781fead0fa0db915cc94ce0720c59e4b51eed4bca333118",
+        .inputs = mstmm_sweep_generic3_column_load_inputs,
+        .outputs = mstmm_sweep_generic3_column_load_outputs,
+        .ir_hash = "f8c3cb9b645cd09cee2681671c26146681c73914ff0545c1bdab55dc1dcca958",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "answer",
-        .function = (void (*)(void))mstmm_sweep_generic3_answer,
-        .call = mstmm_sweep_generic3_answer_call,
+        .name = "column_acceleration",
+        .function = (void (*)(void))mstmm_sweep_generic3_column_acceleration,
+        .call = mstmm_sweep_generic3_column_acceleration_call,
         .n_inputs = 7,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic3_answer_inputs,
-        .outputs = mstmm_sweep_generic3_answer_outputs,
-        .ir_hash = "b5ac799ad6fe0318c2a301ad33893871942fa3f4f79613f42d2c0b12157e0f2b",
+        .inputs = mstmm_sweep_generic3_column_acceleration_inputs,
+        .outputs = mstmm_sweep_generic3_column_acceleration_outputs,
+        .ir_hash = "06b529b17349ac376df1ca45dcdea63230bb96a66dc1aab6adb095e5ffd379d1",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -10248,14 +10254,14 @@ static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "tangent_along",
-        .function = (void (*)(void))mstmm_sweep_generic3_tangent_along,
-        .call = mstmm_sweep_generic3_tangent_along_call,
+        .name = "tangent_coordinate_change",
+        .function = (void (*)(void))mstmm_sweep_generic3_tangent_coordinate_change,
+        .call = mstmm_sweep_generic3_tangent_coordinate_change_call,
         .n_inputs = 2,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic3_tangent_along_inputs,
-        .outputs = mstmm_sweep_generic3_tangent_along_outputs,
-        .ir_hash = "ee51d5229d624d5b1f2598519ecc7c490cd8ad53eda81b2c40e1945f37cada5c",
+        .inputs = mstmm_sweep_generic3_tangent_coordinate_change_inputs,
+        .outputs = mstmm_sweep_generic3_tangent_coordinate_change_outputs,
+        .ir_hash = "c525357e801eb798efe5c1f22883a9e3e3cc7a43bdcc7145eb4935e50deb1248",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -10272,14 +10278,14 @@ static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "tangent_turning",
-        .function = (void (*)(void))mstmm_sweep_generic3_tangent_turning,
-        .call = mstmm_sweep_generic3_tangent_turning_call,
+        .name = "tangent_rotational",
+        .function = (void (*)(void))mstmm_sweep_generic3_tangent_rotational,
+        .call = mstmm_sweep_generic3_tangent_rotational_call,
         .n_inputs = 9,
         .n_outputs = 3,
-        .inputs = mstmm_sweep_generic3_tangent_turning_inputs,
-        .outputs = mstmm_sweep_generic3_tangent_turning_outputs,
-        .ir_hash = "8bd59e73193b9bf1b8af56f274afb8c83ed890b733029352caf53626b20cd9c7",
+        .inputs = mstmm_sweep_generic3_tangent_rotational_inputs,
+        .outputs = mstmm_sweep_generic3_tangent_rotational_outputs,
+        .ir_hash = "f743f1b30ac98a445fd749d450c714f4a23d0ea67036eb8f210343b7c773d80c",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -10308,50 +10314,50 @@ static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "tangent_push",
-        .function = (void (*)(void))mstmm_sweep_generic3_tangent_push,
-        .call = mstmm_sweep_generic3_tangent_push_call,
+        .name = "tangent_load",
+        .function = (void (*)(void))mstmm_sweep_generic3_tangent_load,
+        .call = mstmm_sweep_generic3_tangent_load_call,
         .n_inputs = 7,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic3_tangent_push_inputs,
-        .outputs = mstmm_sweep_generic3_tangent_push_outputs,
-        .ir_hash = "844b92777f3c34bf7cca9d250991f41f2ad229042010fcb303a7d233631ebd56",
+        .inputs = mstmm_sweep_generic3_tangent_load_inputs,
+        .outputs = mstmm_sweep_generic3_tangent_load_outputs,
+        .ir_hash = "deba023d1b3ae3f54e22b5bcfea101196b90f69b99c0b586bc245c15c06fec1f",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "tangent_answer",
-        .function = (void (*)(void))mstmm_sweep_generic3_tangent_answer,
-        .call = mstmm_sweep_generic3_tangent_answer_call,
+        .name = "tangent_solution",
+        .function = (void (*)(void))mstmm_sweep_generic3_tangent_solution,
+        .call = mstmm_sweep_generic3_tangent_solution_call,
         .n_inputs = 9,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic3_tangent_answer_inputs,
-        .outputs = mstmm_sweep_generic3_tangent_answer_outputs,
-        .ir_hash = "5b19c8b68d968d1fd135d67a29a5bb7365aecad9c8b24320d4f22cc985584e1d",
+        .inputs = mstmm_sweep_generic3_tangent_solution_inputs,
+        .outputs = mstmm_sweep_generic3_tangent_solution_outputs,
+        .ir_hash = "94817786987ab1fc7fe81a6e2347a29d394a9ac505e542d63cdc0e48ddda3fa9",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "tangent_push_known",
-        .function = (void (*)(void))mstmm_sweep_generic3_tangent_push_known,
-        .call = mstmm_sweep_generic3_tangent_push_known_call,
+        .name = "tangent_load_with_increments",
+        .function = (void (*)(void))mstmm_sweep_generic3_tangent_load_with_increments,
+        .call = mstmm_sweep_generic3_tangent_load_with_increments_call,
         .n_inputs = 8,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic3_tangent_push_known_inputs,
-        .outputs = mstmm_sweep_generic3_tangent_push_known_outputs,
-        .ir_hash = "f83148ac1bce6a17d39f668f8df35d3c0949bbd347548ee478eaee990fdc2fcb",
+        .inputs = mstmm_sweep_generic3_tangent_load_with_increments_inputs,
+        .outputs = mstmm_sweep_generic3_tangent_load_with_increments_outputs,
+        .ir_hash = "d5b2529934ac2358d4c3b978db551032b54b049157f3a5b865179f1ee9a5cb27",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "tangent_answer_known",
-        .function = (void (*)(void))mstmm_sweep_generic3_tangent_answer_known,
-        .call = mstmm_sweep_generic3_tangent_answer_known_call,
+        .name = "tangent_solution_with_increments",
+        .function = (void (*)(void))mstmm_sweep_generic3_tangent_solution_with_increments,
+        .call = mstmm_sweep_generic3_tangent_solution_with_increments_call,
         .n_inputs = 10,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic3_tangent_answer_known_inputs,
-        .outputs = mstmm_sweep_generic3_tangent_answer_known_outputs,
-        .ir_hash = "3577984e024189bdbafb9230c33e61b95fc88ae79ce17b46e7a0e3bd5e1facaf",
+        .inputs = mstmm_sweep_generic3_tangent_solution_with_increments_inputs,
+        .outputs = mstmm_sweep_generic3_tangent_solution_with_increments_outputs,
+        .ir_hash = "cb9fccf978d3496cca5d5a94d2cd7190aeadbe9de9cf6dded18ea66523936eff",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -10392,50 +10398,50 @@ static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "answered",
-        .function = (void (*)(void))mstmm_sweep_generic3_answered,
-        .call = mstmm_sweep_generic3_answered_call,
+        .name = "add_known_part",
+        .function = (void (*)(void))mstmm_sweep_generic3_add_known_part,
+        .call = mstmm_sweep_generic3_add_known_part_call,
         .n_inputs = 2,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_generic3_answered_inputs,
-        .outputs = mstmm_sweep_generic3_answered_outputs,
-        .ir_hash = "765b07c19ad41b6649c541995b9cebcb414646d1972a5b7c86773d043094a1d5",
+        .inputs = mstmm_sweep_generic3_add_known_part_inputs,
+        .outputs = mstmm_sweep_generic3_add_known_part_outputs,
+        .ir_hash = "c5919eee74907259f2391acbf2228ae318324d31f82c27e60e353e0c30c9a421",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "pull",
-        .function = (void (*)(void))mstmm_sweep_generic3_pull,
-        .call = mstmm_sweep_generic3_pull_call,
+        .name = "add_multiplier_effort",
+        .function = (void (*)(void))mstmm_sweep_generic3_add_multiplier_effort,
+        .call = mstmm_sweep_generic3_add_multiplier_effort_call,
         .n_inputs = 2,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_generic3_pull_inputs,
-        .outputs = mstmm_sweep_generic3_pull_outputs,
-        .ir_hash = "e2623c8ae511bc57510595d0dd228d7073426d8368a02bd5ca40b0e82819885a",
+        .inputs = mstmm_sweep_generic3_add_multiplier_effort_inputs,
+        .outputs = mstmm_sweep_generic3_add_multiplier_effort_outputs,
+        .ir_hash = "5d354851b7717db93db4bf475eff0c44e9defe67e0ce044ca46d3c70b3789818",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "exerted",
-        .function = (void (*)(void))mstmm_sweep_generic3_exerted,
-        .call = mstmm_sweep_generic3_exerted_call,
+        .name = "required_load",
+        .function = (void (*)(void))mstmm_sweep_generic3_required_load,
+        .call = mstmm_sweep_generic3_required_load_call,
         .n_inputs = 3,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_generic3_exerted_inputs,
-        .outputs = mstmm_sweep_generic3_exerted_outputs,
-        .ir_hash = "94fa766d98029fb8be4c5b7c8c1fc9ba57204de1c0c082525b337a941a90706e",
+        .inputs = mstmm_sweep_generic3_required_load_inputs,
+        .outputs = mstmm_sweep_generic3_required_load_outputs,
+        .ir_hash = "bfc9a4ffd15dd9c36f57b0fdaa7f274c6fe65fac388c1cd64dc253b7071cc552",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "push_on_ground",
-        .function = (void (*)(void))mstmm_sweep_generic3_push_on_ground,
-        .call = mstmm_sweep_generic3_push_on_ground_call,
+        .name = "ground_column_load",
+        .function = (void (*)(void))mstmm_sweep_generic3_ground_column_load,
+        .call = mstmm_sweep_generic3_ground_column_load_call,
         .n_inputs = 3,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_generic3_push_on_ground_inputs,
-        .outputs = mstmm_sweep_generic3_push_on_ground_outputs,
-        .ir_hash = "c8a35d332a8a2d6731c5bef35a1704f1b78afbc8fe9f9e31f903da5b63536be3",
+        .inputs = mstmm_sweep_generic3_ground_column_load_inputs,
+        .outputs = mstmm_sweep_generic3_ground_column_load_outputs,
+        .ir_hash = "c072357577765010ae97695f83a2ee2119bbbbd8421d25cbd5a1921d13ce9e42",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -10476,26 +10482,26 @@ static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "answered_slope",
-        .function = (void (*)(void))mstmm_sweep_generic3_answered_slope,
-        .call = mstmm_sweep_generic3_answered_slope_call,
+        .name = "add_known_part_slope",
+        .function = (void (*)(void))mstmm_sweep_generic3_add_known_part_slope,
+        .call = mstmm_sweep_generic3_add_known_part_slope_call,
         .n_inputs = 4,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_generic3_answered_slope_inputs,
-        .outputs = mstmm_sweep_generic3_answered_slope_outputs,
-        .ir_hash = "10f0e4f9de8d443bbcc0a02a2465c7b0a5643e299fdd5ee38f214277046575c7",
+        .inputs = mstmm_sweep_generic3_add_known_part_slope_inputs,
+        .outputs = mstmm_sweep_generic3_add_known_part_slope_outputs,
+        .ir_hash = "3368afafb0f0e93d078f1364fb3fe51a69afbda8cdcf48c8addbf443f44a9160",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "pull_slope",
-        .function = (void (*)(void))mstmm_sweep_generic3_pull_slope,
-        .call = mstmm_sweep_generic3_pull_slope_call,
+        .name = "add_multiplier_effort_slope",
+        .function = (void (*)(void))mstmm_sweep_generic3_add_multiplier_effort_slope,
+        .call = mstmm_sweep_generic3_add_multiplier_effort_slope_call,
         .n_inputs = 4,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_generic3_pull_slope_inputs,
-        .outputs = mstmm_sweep_generic3_pull_slope_outputs,
-        .ir_hash = "4cd53415d16349c36bcae57c163181d0ebe687d0872ae50cb07e1ce316544837",
+        .inputs = mstmm_sweep_generic3_add_multiplier_effort_slope_inputs,
+        .outputs = mstmm_sweep_generic3_add_multiplier_effort_slope_outputs,
+        .ir_hash = "0e4e31553cc32dd3a3c76d65942b0e128d2fdb5ed83a40992bbcf89af1e5a38f",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -10505,7 +10511,7 @@ const mstmm_element mstmm_sweep_generic3 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic3",
-    .hash = "64cbb3f48f92862129cfa030b187017c6294d2f78326d65be140bc6863c0d4ea",
+    .hash = "39b23f410b91af28cc9043804f27ae793d924f05b7af9706bfb3e7609d4ab854",
     .nq = 0,
     .nu = 0,
     .np = 0,

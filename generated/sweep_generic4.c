@@ -30,10 +30,10 @@ int mstmm_sweep_generic4_factor(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict J, const real *restrict W,
     const real *restrict floor_, const real *restrict S, real *restrict F, real *restrict G,
     real *restrict S_I);
-int mstmm_sweep_generic4_push(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic4_column_load(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict G, const real *restrict e,
     const real *restrict tau, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic4_answer(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic4_column_acceleration(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_sweep_generic4_qr_eliminate(const real *restrict H, const real *restrict J,
@@ -49,14 +49,14 @@ int mstmm_sweep_generic4_tangent_column(const real *restrict theta, const real *
     const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
     const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
     real *restrict G, real *restrict row);
-int mstmm_sweep_generic4_tangent_along(const real *restrict H, const real *restrict d_q,
+int mstmm_sweep_generic4_tangent_coordinate_change(const real *restrict H, const real *restrict d_q,
     real *restrict theta, real *restrict x);
 int mstmm_sweep_generic4_tangent_steady(const real *restrict theta, const real *restrict x,
     const real *restrict H, const real *restrict v, const real *restrict w, const real *restrict Q,
     const real *restrict f, const real *restrict d_u, const real *restrict d_s,
     const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
     real *restrict row);
-int mstmm_sweep_generic4_tangent_turning(const real *restrict theta, const real *restrict H,
+int mstmm_sweep_generic4_tangent_rotational(const real *restrict theta, const real *restrict H,
     const real *restrict w, const real *restrict Q, const real *restrict f,
     const real *restrict d_u, const real *restrict d_s, const real *restrict J,
     const real *restrict laws, real *restrict B, real *restrict G, real *restrict row);
@@ -66,29 +66,32 @@ int mstmm_sweep_generic4_tangent_rows(const real *restrict H, const real *restri
 int mstmm_sweep_generic4_tangent_reduce(const real *restrict inverse, const real *restrict right,
     const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
     real *restrict S);
-int mstmm_sweep_generic4_tangent_push(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic4_tangent_load(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict V, const real *restrict inverse,
     const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic4_tangent_answer(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic4_tangent_solution(const real *restrict Rc, const real *restrict r,
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, const real *restrict B, const real *restrict gain,
     const real *restrict y, real *restrict x, real *restrict z);
-int mstmm_sweep_generic4_tangent_push_known(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict V, const real *restrict inverse,
-    const real *restrict e, const real *restrict e_f, const real *restrict e_b, real *restrict y,
-    real *restrict e_I);
-int mstmm_sweep_generic4_tangent_answer_known(const real *restrict Rc, const real *restrict r,
-    const real *restrict w_I, const real *restrict v, const real *restrict w,
-    const real *restrict z_I, const real *restrict B, const real *restrict gain,
-    const real *restrict y, const real *restrict b, real *restrict x, real *restrict z);
+int mstmm_sweep_generic4_tangent_load_with_increments(const real *restrict Rc,
+    const real *restrict r, const real *restrict H, const real *restrict V,
+    const real *restrict inverse, const real *restrict e, const real *restrict e_f,
+    const real *restrict e_b, real *restrict y, real *restrict e_I);
+int mstmm_sweep_generic4_tangent_solution_with_increments(const real *restrict Rc,
+    const real *restrict r, const real *restrict w_I, const real *restrict v,
+    const real *restrict w, const real *restrict z_I, const real *restrict B,
+    const real *restrict gain, const real *restrict y, const real *restrict b, real *restrict x,
+    real *restrict z);
 int mstmm_sweep_generic4_complement(const real *restrict H, real *restrict W);
 int mstmm_sweep_generic4_divide(const real *restrict F, const real *restrict y, real *restrict z);
 int mstmm_sweep_generic4_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
-int mstmm_sweep_generic4_answered(const real *restrict y, const real *restrict z, real *restrict l);
-int mstmm_sweep_generic4_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
-int mstmm_sweep_generic4_exerted(const real *restrict S, const real *restrict H,
+int mstmm_sweep_generic4_add_known_part(const real *restrict y, const real *restrict z,
+    real *restrict l);
+int mstmm_sweep_generic4_add_multiplier_effort(const real *restrict y, const real *restrict x,
+    real *restrict y_0);
+int mstmm_sweep_generic4_required_load(const real *restrict S, const real *restrict H,
     const real *restrict udot, real *restrict e);
-int mstmm_sweep_generic4_push_on_ground(const real *restrict H, const real *restrict e,
+int mstmm_sweep_generic4_ground_column_load(const real *restrict H, const real *restrict e,
     const real *restrict tau, real *restrict y);
 int mstmm_sweep_generic4_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
@@ -101,9 +104,9 @@ int mstmm_sweep_generic4_effort_slope(const real *restrict H, const real *restri
     const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
 int mstmm_sweep_generic4_complement_slope(const real *restrict H, const real *restrict d_H,
     real *restrict d_W);
-int mstmm_sweep_generic4_answered_slope(const real *restrict y, const real *restrict z,
+int mstmm_sweep_generic4_add_known_part_slope(const real *restrict y, const real *restrict z,
     const real *restrict d_y, const real *restrict d_z, real *restrict d_l);
-int mstmm_sweep_generic4_pull_slope(const real *restrict y, const real *restrict x,
+int mstmm_sweep_generic4_add_multiplier_effort_slope(const real *restrict y, const real *restrict x,
     const real *restrict d_y, const real *restrict d_x, real *restrict d_y_0);
 
 #ifndef MSTMM_TWO
@@ -3760,7 +3763,7 @@ static const mstmm_guard mstmm_sweep_generic4_factor_guards[] = {
  * out y[4] (N, N*m) tau - H^T e
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic4_push(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic4_column_load(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict G, const real *restrict e,
     const real *restrict tau, real *restrict y, real *restrict e_I)
 {
@@ -3948,13 +3951,13 @@ int mstmm_sweep_generic4_push(const real *restrict Rc, const real *restrict r,
     return 0;
 }
 
-static int mstmm_sweep_generic4_push_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic4_column_load_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic4_push(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]);
+    return mstmm_sweep_generic4_column_load(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic4_push_inputs[] = {
+static const mstmm_port mstmm_sweep_generic4_column_load_inputs[] = {
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"H", 24, "", 0, 0},
@@ -3963,7 +3966,7 @@ static const mstmm_port mstmm_sweep_generic4_push_inputs[] = {
     {"tau", 4, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic4_push_outputs[] = {
+static const mstmm_port mstmm_sweep_generic4_column_load_outputs[] = {
     {"y", 4, "N, N*m", 0, 0},
     {"e_I", 6, "N, N*m", 1, 0},
 };
@@ -3981,7 +3984,7 @@ static const mstmm_port mstmm_sweep_generic4_push_outputs[] = {
  * out udot[4] accelerations of the free coordinates
  * out delta[6] deviation of the body's acceleration, at P
  */
-int mstmm_sweep_generic4_answer(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic4_column_acceleration(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta)
 {
@@ -4164,13 +4167,13 @@ int mstmm_sweep_generic4_answer(const real *restrict Rc, const real *restrict r,
     return 0;
 }
 
-static int mstmm_sweep_generic4_answer_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic4_column_acceleration_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic4_answer(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
+    return mstmm_sweep_generic4_column_acceleration(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic4_answer_inputs[] = {
+static const mstmm_port mstmm_sweep_generic4_column_acceleration_inputs[] = {
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"H", 24, "", 0, 0},
@@ -4180,7 +4183,7 @@ static const mstmm_port mstmm_sweep_generic4_answer_inputs[] = {
     {"delta_I", 6, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic4_answer_outputs[] = {
+static const mstmm_port mstmm_sweep_generic4_column_acceleration_outputs[] = {
     {"udot", 4, "", 0, 0},
     {"delta", 6, "", 0, 0},
 };
@@ -6491,7 +6494,7 @@ static const mstmm_port mstmm_sweep_generic4_tangent_column_outputs[] = {
  * out theta[3] rotation of the body along the direction, body axes
  * out x[3] displacement of P along the direction, body axes
  */
-int mstmm_sweep_generic4_tangent_along(const real *restrict H, const real *restrict d_q,
+int mstmm_sweep_generic4_tangent_coordinate_change(const real *restrict H, const real *restrict d_q,
     real *restrict theta, real *restrict x)
 {
     const real t0 = H[12] * d_q[0];
@@ -6545,18 +6548,18 @@ int mstmm_sweep_generic4_tangent_along(const real *restrict H, const real *restr
     return 0;
 }
 
-static int mstmm_sweep_generic4_tangent_along_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic4_tangent_coordinate_change_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic4_tangent_along(in[0], in[1], out[0], out[1]);
+    return mstmm_sweep_generic4_tangent_coordinate_change(in[0], in[1], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic4_tangent_along_inputs[] = {
+static const mstmm_port mstmm_sweep_generic4_tangent_coordinate_change_inputs[] = {
     {"H", 24, "", 0, 0},
     {"d_q", 4, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic4_tangent_along_outputs[] = {
+static const mstmm_port mstmm_sweep_generic4_tangent_coordinate_change_outputs[] = {
     {"theta", 3, "", 0, 0},
     {"x", 3, "", 0, 0},
 };
@@ -6921,7 +6924,7 @@ static const mstmm_port mstmm_sweep_generic4_tangent_steady_outputs[] = {
  * out G[6] change of the carried load
  * out row[4] change of the rows by load, rotors and laws
  */
-int mstmm_sweep_generic4_tangent_turning(const real *restrict theta, const real *restrict H,
+int mstmm_sweep_generic4_tangent_rotational(const real *restrict theta, const real *restrict H,
     const real *restrict w, const real *restrict Q, const real *restrict f,
     const real *restrict d_u, const real *restrict d_s, const real *restrict J,
     const real *restrict laws, real *restrict B, real *restrict G, real *restrict row)
@@ -7073,13 +7076,13 @@ int mstmm_sweep_generic4_tangent_turning(const real *restrict theta, const real 
     return 0;
 }
 
-static int mstmm_sweep_generic4_tangent_turning_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic4_tangent_rotational_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic4_tangent_turning(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1], out[2]);
+    return mstmm_sweep_generic4_tangent_rotational(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1], out[2]);
 }
 
-static const mstmm_port mstmm_sweep_generic4_tangent_turning_inputs[] = {
+static const mstmm_port mstmm_sweep_generic4_tangent_rotational_inputs[] = {
     {"theta", 3, "", 0, 0},
     {"H", 24, "", 0, 0},
     {"w", 3, "", 0, 0},
@@ -7091,7 +7094,7 @@ static const mstmm_port mstmm_sweep_generic4_tangent_turning_inputs[] = {
     {"laws", 4, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic4_tangent_turning_outputs[] = {
+static const mstmm_port mstmm_sweep_generic4_tangent_rotational_outputs[] = {
     {"B", 9, "", 0, 0},
     {"G", 6, "", 0, 0},
     {"row", 4, "", 0, 0},
@@ -7683,7 +7686,7 @@ static const mstmm_port mstmm_sweep_generic4_tangent_reduce_outputs[] = {
  * out y[4] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic4_tangent_push(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic4_tangent_load(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict V, const real *restrict inverse,
     const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I)
 {
@@ -7903,13 +7906,13 @@ int mstmm_sweep_generic4_tangent_push(const real *restrict Rc, const real *restr
     return 0;
 }
 
-static int mstmm_sweep_generic4_tangent_push_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic4_tangent_load_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic4_tangent_push(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
+    return mstmm_sweep_generic4_tangent_load(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic4_tangent_push_inputs[] = {
+static const mstmm_port mstmm_sweep_generic4_tangent_load_inputs[] = {
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"H", 24, "", 0, 0},
@@ -7919,7 +7922,7 @@ static const mstmm_port mstmm_sweep_generic4_tangent_push_inputs[] = {
     {"e_f", 4, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic4_tangent_push_outputs[] = {
+static const mstmm_port mstmm_sweep_generic4_tangent_load_outputs[] = {
     {"y", 4, "", 0, 0},
     {"e_I", 6, "N, N*m", 1, 0},
 };
@@ -7939,7 +7942,7 @@ static const mstmm_port mstmm_sweep_generic4_tangent_push_outputs[] = {
  * out x[4] unknowns
  * out z[9] change of the body's motion, own axes
  */
-int mstmm_sweep_generic4_tangent_answer(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic4_tangent_solution(const real *restrict Rc, const real *restrict r,
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, const real *restrict B, const real *restrict gain,
     const real *restrict y, real *restrict x, real *restrict z)
@@ -8230,13 +8233,13 @@ int mstmm_sweep_generic4_tangent_answer(const real *restrict Rc, const real *res
     return 0;
 }
 
-static int mstmm_sweep_generic4_tangent_answer_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic4_tangent_solution_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic4_tangent_answer(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1]);
+    return mstmm_sweep_generic4_tangent_solution(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic4_tangent_answer_inputs[] = {
+static const mstmm_port mstmm_sweep_generic4_tangent_solution_inputs[] = {
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"w_I", 3, "rad/s", 0, 0},
@@ -8248,7 +8251,7 @@ static const mstmm_port mstmm_sweep_generic4_tangent_answer_inputs[] = {
     {"y", 4, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic4_tangent_answer_outputs[] = {
+static const mstmm_port mstmm_sweep_generic4_tangent_solution_outputs[] = {
     {"x", 4, "", 0, 0},
     {"z", 9, "", 0, 0},
 };
@@ -8267,10 +8270,10 @@ static const mstmm_port mstmm_sweep_generic4_tangent_answer_outputs[] = {
  * out y[4] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic4_tangent_push_known(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict V, const real *restrict inverse,
-    const real *restrict e, const real *restrict e_f, const real *restrict e_b, real *restrict y,
-    real *restrict e_I)
+int mstmm_sweep_generic4_tangent_load_with_increments(const real *restrict Rc,
+    const real *restrict r, const real *restrict H, const real *restrict V,
+    const real *restrict inverse, const real *restrict e, const real *restrict e_f,
+    const real *restrict e_b, real *restrict y, real *restrict e_I)
 {
     const real t0 = H[0] * e[0];
     const real t1 = H[4] * e[1];
@@ -8494,13 +8497,13 @@ int mstmm_sweep_generic4_tangent_push_known(const real *restrict Rc, const real 
     return 0;
 }
 
-static int mstmm_sweep_generic4_tangent_push_known_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic4_tangent_load_with_increments_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic4_tangent_push_known(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1]);
+    return mstmm_sweep_generic4_tangent_load_with_increments(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic4_tangent_push_known_inputs[] = {
+static const mstmm_port mstmm_sweep_generic4_tangent_load_with_increments_inputs[] = {
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"H", 24, "", 0, 0},
@@ -8511,7 +8514,7 @@ static const mstmm_port mstmm_sweep_generic4_tangent_push_known_inputs[] = {
     {"e_b", 6, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic4_tangent_push_known_outputs[] = {
+static const mstmm_port mstmm_sweep_generic4_tangent_load_with_increments_outputs[] = {
     {"y", 4, "", 0, 0},
     {"e_I", 6, "N, N*m", 1, 0},
 };
@@ -8532,10 +8535,11 @@ static const mstmm_port mstmm_sweep_generic4_tangent_push_known_outputs[] = {
  * out x[4] unknowns
  * out z[9] change of the body's motion, own axes
  */
-int mstmm_sweep_generic4_tangent_answer_known(const real *restrict Rc, const real *restrict r,
-    const real *restrict w_I, const real *restrict v, const real *restrict w,
-    const real *restrict z_I, const real *restrict B, const real *restrict gain,
-    const real *restrict y, const real *restrict b, real *restrict x, real *restrict z)
+int mstmm_sweep_generic4_tangent_solution_with_increments(const real *restrict Rc,
+    const real *restrict r, const real *restrict w_I, const real *restrict v,
+    const real *restrict w, const real *restrict z_I, const real *restrict B,
+    const real *restrict gain, const real *restrict y, const real *restrict b, real *restrict x,
+    real *restrict z)
 {
     const real t0 = Rc[0] * z_I[0];
     const real t1 = Rc[3] * z_I[1];
@@ -8832,13 +8836,13 @@ int mstmm_sweep_generic4_tangent_answer_known(const real *restrict Rc, const rea
     return 0;
 }
 
-static int mstmm_sweep_generic4_tangent_answer_known_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic4_tangent_solution_with_increments_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic4_tangent_answer_known(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], out[0], out[1]);
+    return mstmm_sweep_generic4_tangent_solution_with_increments(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic4_tangent_answer_known_inputs[] = {
+static const mstmm_port mstmm_sweep_generic4_tangent_solution_with_increments_inputs[] = {
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"w_I", 3, "rad/s", 0, 0},
@@ -8851,7 +8855,7 @@ static const mstmm_port mstmm_sweep_generic4_tangent_answer_known_inputs[] = {
     {"b", 9, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic4_tangent_answer_known_outputs[] = {
+static const mstmm_port mstmm_sweep_generic4_tangent_solution_with_increments_outputs[] = {
     {"x", 4, "", 0, 0},
     {"z", 9, "", 0, 0},
 };
@@ -9630,7 +9634,8 @@ static const mstmm_port mstmm_sweep_generic4_couple_outputs[] = {
  * in  z[4] of the row
  * out l[1] known part of the row, added to what is there
  */
-int mstmm_sweep_generic4_answered(const real *restrict y, const real *restrict z, real *restrict l)
+int mstmm_sweep_generic4_add_known_part(const real *restrict y, const real *restrict z,
+    real *restrict l)
 {
     const real t0 = y[0] * z[0];
     const real t1 = y[1] * z[1];
@@ -9644,18 +9649,18 @@ int mstmm_sweep_generic4_answered(const real *restrict y, const real *restrict z
     return 0;
 }
 
-static int mstmm_sweep_generic4_answered_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic4_add_known_part_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic4_answered(in[0], in[1], out[0]);
+    return mstmm_sweep_generic4_add_known_part(in[0], in[1], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_generic4_answered_inputs[] = {
+static const mstmm_port mstmm_sweep_generic4_add_known_part_inputs[] = {
     {"y", 4, "", 0, 0},
     {"z", 4, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic4_answered_outputs[] = {
+static const mstmm_port mstmm_sweep_generic4_add_known_part_outputs[] = {
     {"l", 1, "", 1, 0},
 };
 
@@ -9666,7 +9671,8 @@ static const mstmm_port mstmm_sweep_generic4_answered_outputs[] = {
  * in  x[1] (N, N*m) multiplier
  * out y_0[4] tau - H^T e, added to what is there
  */
-int mstmm_sweep_generic4_pull(const real *restrict y, const real *restrict x, real *restrict y_0)
+int mstmm_sweep_generic4_add_multiplier_effort(const real *restrict y, const real *restrict x,
+    real *restrict y_0)
 {
     const real t0 = y[0] * x[0];
     y_0[0] += t0;
@@ -9679,18 +9685,18 @@ int mstmm_sweep_generic4_pull(const real *restrict y, const real *restrict x, re
     return 0;
 }
 
-static int mstmm_sweep_generic4_pull_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic4_add_multiplier_effort_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic4_pull(in[0], in[1], out[0]);
+    return mstmm_sweep_generic4_add_multiplier_effort(in[0], in[1], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_generic4_pull_inputs[] = {
+static const mstmm_port mstmm_sweep_generic4_add_multiplier_effort_inputs[] = {
     {"y", 4, "", 0, 0},
     {"x", 1, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic4_pull_outputs[] = {
+static const mstmm_port mstmm_sweep_generic4_add_multiplier_effort_outputs[] = {
     {"y_0", 4, "", 1, 0},
 };
 
@@ -9700,7 +9706,7 @@ static const mstmm_port mstmm_sweep_generic4_pull_outputs[] = {
  * in  udot[4] accelerations of the coordinates
  * out e[6] (N, N*m) force part of f = S a + e, at P
  */
-int mstmm_sweep_generic4_exerted(const real *restrict S, const real *restrict H,
+int mstmm_sweep_generic4_required_load(const real *restrict S, const real *restrict H,
     const real *restrict udot, real *restrict e)
 {
     const real t0 = S[0] * H[0];
@@ -10018,19 +10024,19 @@ int mstmm_sweep_generic4_exerted(const real *restrict S, const real *restrict H,
     return 0;
 }
 
-static int mstmm_sweep_generic4_exerted_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic4_required_load_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic4_exerted(in[0], in[1], in[2], out[0]);
+    return mstmm_sweep_generic4_required_load(in[0], in[1], in[2], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_generic4_exerted_inputs[] = {
+static const mstmm_port mstmm_sweep_generic4_required_load_inputs[] = {
     {"S", 21, "", 0, 0},
     {"H", 24, "", 0, 0},
     {"udot", 4, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic4_exerted_outputs[] = {
+static const mstmm_port mstmm_sweep_generic4_required_load_outputs[] = {
     {"e", 6, "N, N*m", 0, 0},
 };
 
@@ -10042,7 +10048,7 @@ static const mstmm_port mstmm_sweep_generic4_exerted_outputs[] = {
  * in  tau[4] (N, N*m) efforts of the right-hand side on the free coordinates
  * out y[4] (N, N*m) tau - H^T e
  */
-int mstmm_sweep_generic4_push_on_ground(const real *restrict H, const real *restrict e,
+int mstmm_sweep_generic4_ground_column_load(const real *restrict H, const real *restrict e,
     const real *restrict tau, real *restrict y)
 {
     const real t0 = H[0] * e[0];
@@ -10100,19 +10106,19 @@ int mstmm_sweep_generic4_push_on_ground(const real *restrict H, const real *rest
     return 0;
 }
 
-static int mstmm_sweep_generic4_push_on_ground_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic4_ground_column_load_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic4_push_on_ground(in[0], in[1], in[2], out[0]);
+    return mstmm_sweep_generic4_ground_column_load(in[0], in[1], in[2], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_generic4_push_on_ground_inputs[] = {
+static const mstmm_port mstmm_sweep_generic4_ground_column_load_inputs[] = {
     {"H", 24, "", 0, 0},
     {"e", 6, "N, N*m", 0, 0},
     {"tau", 4, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic4_push_on_ground_outputs[] = {
+static const mstmm_port mstmm_sweep_generic4_ground_column_load_outputs[] = {
     {"y", 4, "N, N*m", 0, 0},
 };
 
@@ -12585,7 +12591,7 @@ static const mstmm_port mstmm_sweep_generic4_complement_slope_outputs[] = {
     {"d_W", 36, "", 0, 0},
 };
 
-/* answered and its derivative along a direction
+/* add_known_part and its derivative along a direction
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  y[4] tau - H^T e
@@ -12594,7 +12600,7 @@ static const mstmm_port mstmm_sweep_generic4_complement_slope_outputs[] = {
  * in  d_z[4] derivative of z
  * out d_l[1] derivative of l, added to what is there
  */
-int mstmm_sweep_generic4_answered_slope(const real *restrict y, const real *restrict z,
+int mstmm_sweep_generic4_add_known_part_slope(const real *restrict y, const real *restrict z,
     const real *restrict d_y, const real *restrict d_z, real *restrict d_l)
 {
     const real t0 = z[3] * d_y[3];
@@ -12617,24 +12623,24 @@ int mstmm_sweep_generic4_answered_slope(const real *restrict y, const real *rest
     return 0;
 }
 
-static int mstmm_sweep_generic4_answered_slope_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic4_add_known_part_slope_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic4_answered_slope(in[0], in[1], in[2], in[3], out[0]);
+    return mstmm_sweep_generic4_add_known_part_slope(in[0], in[1], in[2], in[3], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_generic4_answered_slope_inputs[] = {
+static const mstmm_port mstmm_sweep_generic4_add_known_part_slope_inputs[] = {
     {"y", 4, "", 0, 0},
     {"z", 4, "", 0, 0},
     {"d_y", 4, "", 0, 0},
     {"d_z", 4, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic4_answered_slope_outputs[] = {
+static const mstmm_port mstmm_sweep_generic4_add_known_part_slope_outputs[] = {
     {"d_l", 1, "", 1, 0},
 };
 
-/* pull and its derivative along a direction
+/* add_multiplier_effort and its derivative along a direction
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  y[4] of the row
@@ -12643,7 +12649,7 @@ static const mstmm_port mstmm_sweep_generic4_answered_slope_outputs[] = {
  * in  d_x[1] (N, N*m) derivative of x
  * out d_y_0[4] derivative of y_0, added to what is there
  */
-int mstmm_sweep_generic4_pull_slope(const real *restrict y, const real *restrict x,
+int mstmm_sweep_generic4_add_multiplier_effort_slope(const real *restrict y, const real *restrict x,
     const real *restrict d_y, const real *restrict d_x, real *restrict d_y_0)
 {
     const real t0 = x[0] * d_y[0];
@@ -12665,20 +12671,20 @@ int mstmm_sweep_generic4_pull_slope(const real *restrict y, const real *restrict
     return 0;
 }
 
-static int mstmm_sweep_generic4_pull_slope_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic4_add_multiplier_effort_slope_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic4_pull_slope(in[0], in[1], in[2], in[3], out[0]);
+    return mstmm_sweep_generic4_add_multiplier_effort_slope(in[0], in[1], in[2], in[3], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_generic4_pull_slope_inputs[] = {
+static const mstmm_port mstmm_sweep_generic4_add_multiplier_effort_slope_inputs[] = {
     {"y", 4, "", 0, 0},
     {"x", 1, "N, N*m", 0, 0},
     {"d_y", 4, "", 0, 0},
     {"d_x", 1, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic4_pull_slope_outputs[] = {
+static const mstmm_port mstmm_sweep_generic4_add_multiplier_effort_slope_outputs[] = {
     {"d_y_0", 4, "", 1, 0},
 };
 
@@ -12756,26 +12762,26 @@ static const mstmm_kernel mstmm_sweep_generic4_kernels[] = {
         .guards = mstmm_sweep_generic4_factor_guards,
     },
     {
-        .name = "push",
-        .function = (void (*)(void))mstmm_sweep_generic4_push,
-        .call = mstmm_sweep_generic4_push_call,
+        .name = "column_load",
+        .function = (void (*)(void))mstmm_sweep_generic4_column_load,
+        .call = mstmm_sweep_generic4_column_load_call,
         .n_inputs = 6,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic4_push_inputs,
-        .outputs = mstmm_sweep_generic4_push_outputs,
-        .ir_hash = "98ac227bb9a1c7e73eeb2b183e17d971a31359bad8bdbf23abd96821748bca7d",
+        .inputs = mstmm_sweep_generic4_column_load_inputs,
+        .outputs = mstmm_sweep_generic4_column_load_outputs,
+        .ir_hash = "3747c9da81d336d97961cf7d4d80a5eb0512ca380c3f81c933cacae96569e181",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "answer",
-        .function = (void (*)(void))mstmm_sweep_generic4_answer,
-        .call = mstmm_sweep_generic4_answer_call,
+        .name = "column_acceleration",
+        .function = (void (*)(void))mstmm_sweep_generic4_column_acceleration,
+        .call = mstmm_sweep_generic4_column_acceleration_call,
         .n_inputs = 7,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic4_answer_inputs,
-        .outputs = mstmm_sweep_generic4_answer_outputs,
-        .ir_hash = "d5db93961b304f91f21a930806ce44c3354e63cc50cb5ba7dd9b67e04257c6fc",
+        .inputs = mstmm_sweep_generic4_column_acceleration_inputs,
+        .outputs = mstmm_sweep_generic4_column_acceleration_outputs,
+        .ir_hash = "eaf15a0d25582206e9368be4fcdd5530180293fa16706c213ec48dafb2ff7658",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -12816,14 +12822,14 @@ static const mstmm_kernel mstmm_sweep_generic4_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "tangent_along",
-        .function = (void (*)(void))mstmm_sweep_generic4_tangent_along,
-        .call = mstmm_sweep_generic4_tangent_along_call,
+        .name = "tangent_coordinate_change",
+        .function = (void (*)(void))mstmm_sweep_generic4_tangent_coordinate_change,
+        .call = mstmm_sweep_generic4_tangent_coordinate_change_call,
         .n_inputs = 2,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic4_tangent_along_inputs,
-        .outputs = mstmm_sweep_generic4_tangent_along_outputs,
-        .ir_hash = "a4395210a05ea9574e46ce74ae8938d103a0acd2e380a5abbae0f10803b44846",
+        .inputs = mstmm_sweep_generic4_tangent_coordinate_change_inputs,
+        .outputs = mstmm_sweep_generic4_tangent_coordinate_change_outputs,
+        .ir_hash = "e50230bef119a8f5105494fcc17894830da1d46034b62c9a335874bc1e3b59b0",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -12840,14 +12846,14 @@ static const mstmm_kernel mstmm_sweep_generic4_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "tangent_turning",
-        .function = (void (*)(void))mstmm_sweep_generic4_tangent_turning,
-        .call = mstmm_sweep_generic4_tangent_turning_call,
+        .name = "tangent_rotational",
+        .function = (void (*)(void))mstmm_sweep_generic4_tangent_rotational,
+        .call = mstmm_sweep_generic4_tangent_rotational_call,
         .n_inputs = 9,
         .n_outputs = 3,
-        .inputs = mstmm_sweep_generic4_tangent_turning_inputs,
-        .outputs = mstmm_sweep_generic4_tangent_turning_outputs,
-        .ir_hash = "7866fe2bc93dc892ecd6c258bcefe3173dde3c6db63c05ceffdb22088bf05765",
+        .inputs = mstmm_sweep_generic4_tangent_rotational_inputs,
+        .outputs = mstmm_sweep_generic4_tangent_rotational_outputs,
+        .ir_hash = "e0def501d8f1db85e52b0bc61abc35de0e7200d84de65b5e9ef1cb1fefac56f4",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -12876,50 +12882,50 @@ static const mstmm_kernel mstmm_sweep_generic4_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "tangent_push",
-        .function = (void (*)(void))mstmm_sweep_generic4_tangent_push,
-        .call = mstmm_sweep_generic4_tangent_push_call,
+        .name = "tangent_load",
+        .function = (void (*)(void))mstmm_sweep_generic4_tangent_load,
+        .call = mstmm_sweep_generic4_tangent_load_call,
         .n_inputs = 7,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic4_tangent_push_inputs,
-        .outputs = mstmm_sweep_generic4_tangent_push_outputs,
-        .ir_hash = "341f098a890652b1b45a9e8e15b971069edf6646f7454052229323b470766c24",
+        .inputs = mstmm_sweep_generic4_tangent_load_inputs,
+        .outputs = mstmm_sweep_generic4_tangent_load_outputs,
+        .ir_hash = "c693945947e8b986ea0709a5afe9f8068dce07b3bea5581154e6102c45205897",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "tangent_answer",
-        .function = (void (*)(void))mstmm_sweep_generic4_tangent_answer,
-        .call = mstmm_sweep_generic4_tangent_answer_call,
+        .name = "tangent_solution",
+        .function = (void (*)(void))mstmm_sweep_generic4_tangent_solution,
+        .call = mstmm_sweep_generic4_tangent_solution_call,
         .n_inputs = 9,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic4_tangent_answer_inputs,
-        .outputs = mstmm_sweep_generic4_tangent_answer_outputs,
-        .ir_hash = "8f6b87907f8ef824a5ce33dfc581aebcd40acf6f9e5841ec8b26c39e483aa30c",
+        .inputs = mstmm_sweep_generic4_tangent_solution_inputs,
+        .outputs = mstmm_sweep_generic4_tangent_solution_outputs,
+        .ir_hash = "17f87f0d0b562be1566d72dc5e3c824fc55f10bab3c6672f00ba7d703d9d85ce",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "tangent_push_known",
-        .function = (void (*)(void))mstmm_sweep_generic4_tangent_push_known,
-        .call = mstmm_sweep_generic4_tangent_push_known_call,
+        .name = "tangent_load_with_increments",
+        .function = (void (*)(void))mstmm_sweep_generic4_tangent_load_with_increments,
+        .call = mstmm_sweep_generic4_tangent_load_with_increments_call,
         .n_inputs = 8,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic4_tangent_push_known_inputs,
-        .outputs = mstmm_sweep_generic4_tangent_push_known_outputs,
-        .ir_hash = "e4f60fb0f91266f96739054738072a35b379a8243d51909d0e3ac0e7b7e3460f",
+        .inputs = mstmm_sweep_generic4_tangent_load_with_increments_inputs,
+        .outputs = mstmm_sweep_generic4_tangent_load_with_increments_outputs,
+        .ir_hash = "d8103a48a916f288b72554d991be651e39a2b099580f99f61065bcfb9c35b3f4",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "tangent_answer_known",
-        .function = (void (*)(void))mstmm_sweep_generic4_tangent_answer_known,
-        .call = mstmm_sweep_generic4_tangent_answer_known_call,
+        .name = "tangent_solution_with_increments",
+        .function = (void (*)(void))mstmm_sweep_generic4_tangent_solution_with_increments,
+        .call = mstmm_sweep_generic4_tangent_solution_with_increments_call,
         .n_inputs = 10,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic4_tangent_answer_known_inputs,
-        .outputs = mstmm_sweep_generic4_tangent_answer_known_outputs,
-        .ir_hash = "b9b6bfa6ddf37aca2e999f734ffda8a7eb7371369c1a0ec2c9071cba871f95cc",
+        .inputs = mstmm_sweep_generic4_tangent_solution_with_increments_inputs,
+        .outputs = mstmm_sweep_generic4_tangent_solution_with_increments_outputs,
+        .ir_hash = "1297eb9b7f2c249b1fd185136568630b4cd407ce5be342dd9410e731408ea82e",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -12960,50 +12966,50 @@ static const mstmm_kernel mstmm_sweep_generic4_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "answered",
-        .function = (void (*)(void))mstmm_sweep_generic4_answered,
-        .call = mstmm_sweep_generic4_answered_call,
+        .name = "add_known_part",
+        .function = (void (*)(void))mstmm_sweep_generic4_add_known_part,
+        .call = mstmm_sweep_generic4_add_known_part_call,
         .n_inputs = 2,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_generic4_answered_inputs,
-        .outputs = mstmm_sweep_generic4_answered_outputs,
-        .ir_hash = "f37c5e0470013e7a04d14fe0988773df0162c3fec9a87f13c3f3e8a0bb14af89",
+        .inputs = mstmm_sweep_generic4_add_known_part_inputs,
+        .outputs = mstmm_sweep_generic4_add_known_part_outputs,
+        .ir_hash = "79f457836cfbf2a3bb17b16001a54a1c2f1329a6795ed0254057b8ae31a449f8",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "pull",
-        .function = (void (*)(void))mstmm_sweep_generic4_pull,
-        .call = mstmm_sweep_generic4_pull_call,
+        .name = "add_multiplier_effort",
+        .function = (void (*)(void))mstmm_sweep_generic4_add_multiplier_effort,
+        .call = mstmm_sweep_generic4_add_multiplier_effort_call,
         .n_inputs = 2,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_generic4_pull_inputs,
-        .outputs = mstmm_sweep_generic4_pull_outputs,
-        .ir_hash = "58a9f280b2c22932bf8940495154fe6fd0c211c5cb13dd04054f169d4345a30a",
+        .inputs = mstmm_sweep_generic4_add_multiplier_effort_inputs,
+        .outputs = mstmm_sweep_generic4_add_multiplier_effort_outputs,
+        .ir_hash = "ae01e743425c1d0db12cd25d232e15516dcbaefdf9d9ea82cf477c15d2b28381",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "exerted",
-        .function = (void (*)(void))mstmm_sweep_generic4_exerted,
-        .call = mstmm_sweep_generic4_exerted_call,
+        .name = "required_load",
+        .function = (void (*)(void))mstmm_sweep_generic4_required_load,
+        .call = mstmm_sweep_generic4_required_load_call,
         .n_inputs = 3,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_generic4_exerted_inputs,
-        .outputs = mstmm_sweep_generic4_exerted_outputs,
-        .ir_hash = "51603336a7131de3307e1277ed34834cd9127295cfc46df3ac00f9332fae96f7",
+        .inputs = mstmm_sweep_generic4_required_load_inputs,
+        .outputs = mstmm_sweep_generic4_required_load_outputs,
+        .ir_hash = "18ce0792463fc5a9105f626d4830f801736029518de30ddbd9cdcbb812069b7d",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "push_on_ground",
-        .function = (void (*)(void))mstmm_sweep_generic4_push_on_ground,
-        .call = mstmm_sweep_generic4_push_on_ground_call,
+        .name = "ground_column_load",
+        .function = (void (*)(void))mstmm_sweep_generic4_ground_column_load,
+        .call = mstmm_sweep_generic4_ground_column_load_call,
         .n_inputs = 3,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_generic4_push_on_ground_inputs,
-        .outputs = mstmm_sweep_generic4_push_on_ground_outputs,
-        .ir_hash = "7b765849b2d961699ea6d3ca4d52ebc911bd3321bc16071534de4b9a48e3caf7",
+        .inputs = mstmm_sweep_generic4_ground_column_load_inputs,
+        .outputs = mstmm_sweep_generic4_ground_column_load_outputs,
+        .ir_hash = "86c1b21009c414880d7bb4097eaeb4466d9b68d60ac2184b1dbdc40ff1fcd9a0",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -13044,26 +13050,26 @@ static const mstmm_kernel mstmm_sweep_generic4_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "answered_slope",
-        .function = (void (*)(void))mstmm_sweep_generic4_answered_slope,
-        .call = mstmm_sweep_generic4_answered_slope_call,
+        .name = "add_known_part_slope",
+        .function = (void (*)(void))mstmm_sweep_generic4_add_known_part_slope,
+        .call = mstmm_sweep_generic4_add_known_part_slope_call,
         .n_inputs = 4,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_generic4_answered_slope_inputs,
-        .outputs = mstmm_sweep_generic4_answered_slope_outputs,
-        .ir_hash = "110f1881d89e20589e6ed601a491a49ec2d725fcf6fa404b146f9f7b3a7cbda2",
+        .inputs = mstmm_sweep_generic4_add_known_part_slope_inputs,
+        .outputs = mstmm_sweep_generic4_add_known_part_slope_outputs,
+        .ir_hash = "83dd93563cd44500c04804cea887ce433cc40aeaefbce59832df836b47ff8036",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "pull_slope",
-        .function = (void (*)(void))mstmm_sweep_generic4_pull_slope,
-        .call = mstmm_sweep_generic4_pull_slope_call,
+        .name = "add_multiplier_effort_slope",
+        .function = (void (*)(void))mstmm_sweep_generic4_add_multiplier_effort_slope,
+        .call = mstmm_sweep_generic4_add_multiplier_effort_slope_call,
         .n_inputs = 4,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_generic4_pull_slope_inputs,
-        .outputs = mstmm_sweep_generic4_pull_slope_outputs,
-        .ir_hash = "f8dc6f4853765310cfab1e13386498da7210606a24e2c0473dea591bc9b1da82",
+        .inputs = mstmm_sweep_generic4_add_multiplier_effort_slope_inputs,
+        .outputs = mstmm_sweep_generic4_add_multiplier_effort_slope_outputs,
+        .ir_hash = "6c357a1a78f20728c9d1470251324705795e5e5b2bfe446cd750ddea3b9b22c1",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -13073,7 +13079,7 @@ const mstmm_element mstmm_sweep_generic4 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic4",
-    .hash = "6804857cfd7a8b207fc85fd956cccf49b0244c26daa242f5754ed1073a9c3f9b",
+    .hash = "8e6d24944ff653e5a3c9cd0589974a151dbb84ec8ef0d21b58def6293678d4ef",
     .nq = 0,
     .nu = 0,
     .np = 0,

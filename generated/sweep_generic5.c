@@ -30,10 +30,10 @@ int mstmm_sweep_generic5_factor(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict J, const real *restrict W,
     const real *restrict floor_, const real *restrict S, real *restrict F, real *restrict G,
     real *restrict S_I);
-int mstmm_sweep_generic5_push(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic5_column_load(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict G, const real *restrict e,
     const real *restrict tau, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic5_answer(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic5_column_acceleration(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_sweep_generic5_qr_eliminate(const real *restrict H, const real *restrict J,
@@ -49,14 +49,14 @@ int mstmm_sweep_generic5_tangent_column(const real *restrict theta, const real *
     const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
     const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
     real *restrict G, real *restrict row);
-int mstmm_sweep_generic5_tangent_along(const real *restrict H, const real *restrict d_q,
+int mstmm_sweep_generic5_tangent_coordinate_change(const real *restrict H, const real *restrict d_q,
     real *restrict theta, real *restrict x);
 int mstmm_sweep_generic5_tangent_steady(const real *restrict theta, const real *restrict x,
     const real *restrict H, const real *restrict v, const real *restrict w, const real *restrict Q,
     const real *restrict f, const real *restrict d_u, const real *restrict d_s,
     const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
     real *restrict row);
-int mstmm_sweep_generic5_tangent_turning(const real *restrict theta, const real *restrict H,
+int mstmm_sweep_generic5_tangent_rotational(const real *restrict theta, const real *restrict H,
     const real *restrict w, const real *restrict Q, const real *restrict f,
     const real *restrict d_u, const real *restrict d_s, const real *restrict J,
     const real *restrict laws, real *restrict B, real *restrict G, real *restrict row);
@@ -66,29 +66,32 @@ int mstmm_sweep_generic5_tangent_rows(const real *restrict H, const real *restri
 int mstmm_sweep_generic5_tangent_reduce(const real *restrict inverse, const real *restrict right,
     const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
     real *restrict S);
-int mstmm_sweep_generic5_tangent_push(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic5_tangent_load(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict V, const real *restrict inverse,
     const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic5_tangent_answer(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic5_tangent_solution(const real *restrict Rc, const real *restrict r,
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, const real *restrict B, const real *restrict gain,
     const real *restrict y, real *restrict x, real *restrict z);
-int mstmm_sweep_generic5_tangent_push_known(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict V, const real *restrict inverse,
-    const real *restrict e, const real *restrict e_f, const real *restrict e_b, real *restrict y,
-    real *restrict e_I);
-int mstmm_sweep_generic5_tangent_answer_known(const real *restrict Rc, const real *restrict r,
-    const real *restrict w_I, const real *restrict v, const real *restrict w,
-    const real *restrict z_I, const real *restrict B, const real *restrict gain,
-    const real *restrict y, const real *restrict b, real *restrict x, real *restrict z);
+int mstmm_sweep_generic5_tangent_load_with_increments(const real *restrict Rc,
+    const real *restrict r, const real *restrict H, const real *restrict V,
+    const real *restrict inverse, const real *restrict e, const real *restrict e_f,
+    const real *restrict e_b, real *restrict y, real *restrict e_I);
+int mstmm_sweep_generic5_tangent_solution_with_increments(const real *restrict Rc,
+    const real *restrict r, const real *restrict w_I, const real *restrict v,
+    const real *restrict w, const real *restrict z_I, const real *restrict B,
+    const real *restrict gain, const real *restrict y, const real *restrict b, real *restrict x,
+    real *restrict z);
 int mstmm_sweep_generic5_complement(const real *restrict H, real *restrict W);
 int mstmm_sweep_generic5_divide(const real *restrict F, const real *restrict y, real *restrict z);
 int mstmm_sweep_generic5_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
-int mstmm_sweep_generic5_answered(const real *restrict y, const real *restrict z, real *restrict l);
-int mstmm_sweep_generic5_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
-int mstmm_sweep_generic5_exerted(const real *restrict S, const real *restrict H,
+int mstmm_sweep_generic5_add_known_part(const real *restrict y, const real *restrict z,
+    real *restrict l);
+int mstmm_sweep_generic5_add_multiplier_effort(const real *restrict y, const real *restrict x,
+    real *restrict y_0);
+int mstmm_sweep_generic5_required_load(const real *restrict S, const real *restrict H,
     const real *restrict udot, real *restrict e);
-int mstmm_sweep_generic5_push_on_ground(const real *restrict H, const real *restrict e,
+int mstmm_sweep_generic5_ground_column_load(const real *restrict H, const real *restrict e,
     const real *restrict tau, real *restrict y);
 int mstmm_sweep_generic5_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
@@ -101,9 +104,9 @@ int mstmm_sweep_generic5_effort_slope(const real *restrict H, const real *restri
     const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
 int mstmm_sweep_generic5_complement_slope(const real *restrict H, const real *restrict d_H,
     real *restrict d_W);
-int mstmm_sweep_generic5_answered_slope(const real *restrict y, const real *restrict z,
+int mstmm_sweep_generic5_add_known_part_slope(const real *restrict y, const real *restrict z,
     const real *restrict d_y, const real *restrict d_z, real *restrict d_l);
-int mstmm_sweep_generic5_pull_slope(const real *restrict y, const real *restrict x,
+int mstmm_sweep_generic5_add_multiplier_effort_slope(const real *restrict y, const real *restrict x,
     const real *restrict d_y, const real *restrict d_x, real *restrict d_y_0);
 
 #ifndef MSTMM_TWO
@@ -4622,7 +4625,7 @@ static const mstmm_guard mstmm_sweep_generic5_factor_guards[] = {
  * out y[5] (N, N*m) tau - H^T e
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic5_push(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic5_column_load(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict G, const real *restrict e,
     const real *restrict tau, real *restrict y, real *restrict e_I)
 {
@@ -4835,13 +4838,13 @@ int mstmm_sweep_generic5_push(const real *restrict Rc, const real *restrict r,
     return 0;
 }
 
-static int mstmm_sweep_generic5_push_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic5_column_load_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic5_push(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]);
+    return mstmm_sweep_generic5_column_load(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic5_push_inputs[] = {
+static const mstmm_port mstmm_sweep_generic5_column_load_inputs[] = {
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"H", 30, "", 0, 0},
@@ -4850,7 +4853,7 @@ static const mstmm_port mstmm_sweep_generic5_push_inputs[] = {
     {"tau", 5, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic5_push_outputs[] = {
+static const mstmm_port mstmm_sweep_generic5_column_load_outputs[] = {
     {"y", 5, "N, N*m", 0, 0},
     {"e_I", 6, "N, N*m", 1, 0},
 };
@@ -4868,7 +4871,7 @@ static const mstmm_port mstmm_sweep_generic5_push_outputs[] = {
  * out udot[5] accelerations of the free coordinates
  * out delta[6] deviation of the body's acceleration, at P
  */
-int mstmm_sweep_generic5_answer(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic5_column_acceleration(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta)
 {
@@ -5093,13 +5096,13 @@ int mstmm_sweep_generic5_answer(const real *restrict Rc, const real *restrict r,
     return 0;
 }
 
-static int mstmm_sweep_generic5_answer_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic5_column_acceleration_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic5_answer(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
+    return mstmm_sweep_generic5_column_acceleration(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic5_answer_inputs[] = {
+static const mstmm_port mstmm_sweep_generic5_column_acceleration_inputs[] = {
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"H", 30, "", 0, 0},
@@ -5109,7 +5112,7 @@ static const mstmm_port mstmm_sweep_generic5_answer_inputs[] = {
     {"delta_I", 6, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic5_answer_outputs[] = {
+static const mstmm_port mstmm_sweep_generic5_column_acceleration_outputs[] = {
     {"udot", 5, "", 0, 0},
     {"delta", 6, "", 0, 0},
 };
@@ -7980,7 +7983,7 @@ static const mstmm_port mstmm_sweep_generic5_tangent_column_outputs[] = {
  * out theta[3] rotation of the body along the direction, body axes
  * out x[3] displacement of P along the direction, body axes
  */
-int mstmm_sweep_generic5_tangent_along(const real *restrict H, const real *restrict d_q,
+int mstmm_sweep_generic5_tangent_coordinate_change(const real *restrict H, const real *restrict d_q,
     real *restrict theta, real *restrict x)
 {
     const real t0 = H[15] * d_q[0];
@@ -8046,18 +8049,18 @@ int mstmm_sweep_generic5_tangent_along(const real *restrict H, const real *restr
     return 0;
 }
 
-static int mstmm_sweep_generic5_tangent_along_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic5_tangent_coordinate_change_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic5_tangent_along(in[0], in[1], out[0], out[1]);
+    return mstmm_sweep_generic5_tangent_coordinate_change(in[0], in[1], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic5_tangent_along_inputs[] = {
+static const mstmm_port mstmm_sweep_generic5_tangent_coordinate_change_inputs[] = {
     {"H", 30, "", 0, 0},
     {"d_q", 5, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic5_tangent_along_outputs[] = {
+static const mstmm_port mstmm_sweep_generic5_tangent_coordinate_change_outputs[] = {
     {"theta", 3, "", 0, 0},
     {"x", 3, "", 0, 0},
 };
@@ -8449,7 +8452,7 @@ static const mstmm_port mstmm_sweep_generic5_tangent_steady_outputs[] = {
  * out G[6] change of the carried load
  * out row[5] change of the rows by load, rotors and laws
  */
-int mstmm_sweep_generic5_tangent_turning(const real *restrict theta, const real *restrict H,
+int mstmm_sweep_generic5_tangent_rotational(const real *restrict theta, const real *restrict H,
     const real *restrict w, const real *restrict Q, const real *restrict f,
     const real *restrict d_u, const real *restrict d_s, const real *restrict J,
     const real *restrict laws, real *restrict B, real *restrict G, real *restrict row)
@@ -8616,13 +8619,13 @@ int mstmm_sweep_generic5_tangent_turning(const real *restrict theta, const real 
     return 0;
 }
 
-static int mstmm_sweep_generic5_tangent_turning_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic5_tangent_rotational_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic5_tangent_turning(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1], out[2]);
+    return mstmm_sweep_generic5_tangent_rotational(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1], out[2]);
 }
 
-static const mstmm_port mstmm_sweep_generic5_tangent_turning_inputs[] = {
+static const mstmm_port mstmm_sweep_generic5_tangent_rotational_inputs[] = {
     {"theta", 3, "", 0, 0},
     {"H", 30, "", 0, 0},
     {"w", 3, "", 0, 0},
@@ -8634,7 +8637,7 @@ static const mstmm_port mstmm_sweep_generic5_tangent_turning_inputs[] = {
     {"laws", 5, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic5_tangent_turning_outputs[] = {
+static const mstmm_port mstmm_sweep_generic5_tangent_rotational_outputs[] = {
     {"B", 9, "", 0, 0},
     {"G", 6, "", 0, 0},
     {"row", 5, "", 0, 0},
@@ -9424,7 +9427,7 @@ static const mstmm_port mstmm_sweep_generic5_tangent_reduce_outputs[] = {
  * out y[5] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic5_tangent_push(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic5_tangent_load(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict V, const real *restrict inverse,
     const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I)
 {
@@ -9687,13 +9690,13 @@ int mstmm_sweep_generic5_tangent_push(const real *restrict Rc, const real *restr
     return 0;
 }
 
-static int mstmm_sweep_generic5_tangent_push_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic5_tangent_load_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic5_tangent_push(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
+    return mstmm_sweep_generic5_tangent_load(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic5_tangent_push_inputs[] = {
+static const mstmm_port mstmm_sweep_generic5_tangent_load_inputs[] = {
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"H", 30, "", 0, 0},
@@ -9703,7 +9706,7 @@ static const mstmm_port mstmm_sweep_generic5_tangent_push_inputs[] = {
     {"e_f", 5, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic5_tangent_push_outputs[] = {
+static const mstmm_port mstmm_sweep_generic5_tangent_load_outputs[] = {
     {"y", 5, "", 0, 0},
     {"e_I", 6, "N, N*m", 1, 0},
 };
@@ -9723,7 +9726,7 @@ static const mstmm_port mstmm_sweep_generic5_tangent_push_outputs[] = {
  * out x[5] unknowns
  * out z[9] change of the body's motion, own axes
  */
-int mstmm_sweep_generic5_tangent_answer(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic5_tangent_solution(const real *restrict Rc, const real *restrict r,
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, const real *restrict B, const real *restrict gain,
     const real *restrict y, real *restrict x, real *restrict z)
@@ -10051,13 +10054,13 @@ int mstmm_sweep_generic5_tangent_answer(const real *restrict Rc, const real *res
     return 0;
 }
 
-static int mstmm_sweep_generic5_tangent_answer_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic5_tangent_solution_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic5_tangent_answer(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1]);
+    return mstmm_sweep_generic5_tangent_solution(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic5_tangent_answer_inputs[] = {
+static const mstmm_port mstmm_sweep_generic5_tangent_solution_inputs[] = {
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"w_I", 3, "rad/s", 0, 0},
@@ -10069,7 +10072,7 @@ static const mstmm_port mstmm_sweep_generic5_tangent_answer_inputs[] = {
     {"y", 5, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic5_tangent_answer_outputs[] = {
+static const mstmm_port mstmm_sweep_generic5_tangent_solution_outputs[] = {
     {"x", 5, "", 0, 0},
     {"z", 9, "", 0, 0},
 };
@@ -10088,10 +10091,10 @@ static const mstmm_port mstmm_sweep_generic5_tangent_answer_outputs[] = {
  * out y[5] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic5_tangent_push_known(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict V, const real *restrict inverse,
-    const real *restrict e, const real *restrict e_f, const real *restrict e_b, real *restrict y,
-    real *restrict e_I)
+int mstmm_sweep_generic5_tangent_load_with_increments(const real *restrict Rc,
+    const real *restrict r, const real *restrict H, const real *restrict V,
+    const real *restrict inverse, const real *restrict e, const real *restrict e_f,
+    const real *restrict e_b, real *restrict y, real *restrict e_I)
 {
     const real t0 = H[0] * e[0];
     const real t1 = H[5] * e[1];
@@ -10358,13 +10361,13 @@ int mstmm_sweep_generic5_tangent_push_known(const real *restrict Rc, const real 
     return 0;
 }
 
-static int mstmm_sweep_generic5_tangent_push_known_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic5_tangent_load_with_increments_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic5_tangent_push_known(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1]);
+    return mstmm_sweep_generic5_tangent_load_with_increments(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic5_tangent_push_known_inputs[] = {
+static const mstmm_port mstmm_sweep_generic5_tangent_load_with_increments_inputs[] = {
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"H", 30, "", 0, 0},
@@ -10375,7 +10378,7 @@ static const mstmm_port mstmm_sweep_generic5_tangent_push_known_inputs[] = {
     {"e_b", 6, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic5_tangent_push_known_outputs[] = {
+static const mstmm_port mstmm_sweep_generic5_tangent_load_with_increments_outputs[] = {
     {"y", 5, "", 0, 0},
     {"e_I", 6, "N, N*m", 1, 0},
 };
@@ -10396,10 +10399,11 @@ static const mstmm_port mstmm_sweep_generic5_tangent_push_known_outputs[] = {
  * out x[5] unknowns
  * out z[9] change of the body's motion, own axes
  */
-int mstmm_sweep_generic5_tangent_answer_known(const real *restrict Rc, const real *restrict r,
-    const real *restrict w_I, const real *restrict v, const real *restrict w,
-    const real *restrict z_I, const real *restrict B, const real *restrict gain,
-    const real *restrict y, const real *restrict b, real *restrict x, real *restrict z)
+int mstmm_sweep_generic5_tangent_solution_with_increments(const real *restrict Rc,
+    const real *restrict r, const real *restrict w_I, const real *restrict v,
+    const real *restrict w, const real *restrict z_I, const real *restrict B,
+    const real *restrict gain, const real *restrict y, const real *restrict b, real *restrict x,
+    real *restrict z)
 {
     const real t0 = Rc[0] * z_I[0];
     const real t1 = Rc[3] * z_I[1];
@@ -10733,13 +10737,13 @@ int mstmm_sweep_generic5_tangent_answer_known(const real *restrict Rc, const rea
     return 0;
 }
 
-static int mstmm_sweep_generic5_tangent_answer_known_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic5_tangent_solution_with_increments_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic5_tangent_answer_known(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], out[0], out[1]);
+    return mstmm_sweep_generic5_tangent_solution_with_increments(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic5_tangent_answer_known_inputs[] = {
+static const mstmm_port mstmm_sweep_generic5_tangent_solution_with_increments_inputs[] = {
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"w_I", 3, "rad/s", 0, 0},
@@ -10752,7 +10756,7 @@ static const mstmm_port mstmm_sweep_generic5_tangent_answer_known_inputs[] = {
     {"b", 9, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic5_tangent_answer_known_outputs[] = {
+static const mstmm_port mstmm_sweep_generic5_tangent_solution_with_increments_outputs[] = {
     {"x", 5, "", 0, 0},
     {"z", 9, "", 0, 0},
 };
@@ -11758,7 +11762,8 @@ static const mstmm_port mstmm_sweep_generic5_couple_outputs[] = {
  * in  z[5] of the row
  * out l[1] known part of the row, added to what is there
  */
-int mstmm_sweep_generic5_answered(const real *restrict y, const real *restrict z, real *restrict l)
+int mstmm_sweep_generic5_add_known_part(const real *restrict y, const real *restrict z,
+    real *restrict l)
 {
     const real t0 = y[0] * z[0];
     const real t1 = y[1] * z[1];
@@ -11774,18 +11779,18 @@ int mstmm_sweep_generic5_answered(const real *restrict y, const real *restrict z
     return 0;
 }
 
-static int mstmm_sweep_generic5_answered_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic5_add_known_part_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic5_answered(in[0], in[1], out[0]);
+    return mstmm_sweep_generic5_add_known_part(in[0], in[1], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_generic5_answered_inputs[] = {
+static const mstmm_port mstmm_sweep_generic5_add_known_part_inputs[] = {
     {"y", 5, "", 0, 0},
     {"z", 5, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic5_answered_outputs[] = {
+static const mstmm_port mstmm_sweep_generic5_add_known_part_outputs[] = {
     {"l", 1, "", 1, 0},
 };
 
@@ -11796,7 +11801,8 @@ static const mstmm_port mstmm_sweep_generic5_answered_outputs[] = {
  * in  x[1] (N, N*m) multiplier
  * out y_0[5] tau - H^T e, added to what is there
  */
-int mstmm_sweep_generic5_pull(const real *restrict y, const real *restrict x, real *restrict y_0)
+int mstmm_sweep_generic5_add_multiplier_effort(const real *restrict y, const real *restrict x,
+    real *restrict y_0)
 {
     const real t0 = y[0] * x[0];
     y_0[0] += t0;
@@ -11811,18 +11817,18 @@ int mstmm_sweep_generic5_pull(const real *restrict y, const real *restrict x, re
     return 0;
 }
 
-static int mstmm_sweep_generic5_pull_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic5_add_multiplier_effort_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic5_pull(in[0], in[1], out[0]);
+    return mstmm_sweep_generic5_add_multiplier_effort(in[0], in[1], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_generic5_pull_inputs[] = {
+static const mstmm_port mstmm_sweep_generic5_add_multiplier_effort_inputs[] = {
     {"y", 5, "", 0, 0},
     {"x", 1, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic5_pull_outputs[] = {
+static const mstmm_port mstmm_sweep_generic5_add_multiplier_effort_outputs[] = {
     {"y_0", 5, "", 1, 0},
 };
 
@@ -11832,7 +11838,7 @@ static const mstmm_port mstmm_sweep_generic5_pull_outputs[] = {
  * in  udot[5] accelerations of the coordinates
  * out e[6] (N, N*m) force part of f = S a + e, at P
  */
-int mstmm_sweep_generic5_exerted(const real *restrict S, const real *restrict H,
+int mstmm_sweep_generic5_required_load(const real *restrict S, const real *restrict H,
     const real *restrict udot, real *restrict e)
 {
     const real t0 = S[0] * H[0];
@@ -12228,19 +12234,19 @@ int mstmm_sweep_generic5_exerted(const real *restrict S, const real *restrict H,
     return 0;
 }
 
-static int mstmm_sweep_generic5_exerted_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic5_required_load_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic5_exerted(in[0], in[1], in[2], out[0]);
+    return mstmm_sweep_generic5_required_load(in[0], in[1], in[2], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_generic5_exerted_inputs[] = {
+static const mstmm_port mstmm_sweep_generic5_required_load_inputs[] = {
     {"S", 21, "", 0, 0},
     {"H", 30, "", 0, 0},
     {"udot", 5, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic5_exerted_outputs[] = {
+static const mstmm_port mstmm_sweep_generic5_required_load_outputs[] = {
     {"e", 6, "N, N*m", 0, 0},
 };
 
@@ -12252,7 +12258,7 @@ static const mstmm_port mstmm_sweep_generic5_exerted_outputs[] = {
  * in  tau[5] (N, N*m) efforts of the right-hand side on the free coordinates
  * out y[5] (N, N*m) tau - H^T e
  */
-int mstmm_sweep_generic5_push_on_ground(const real *restrict H, const real *restrict e,
+int mstmm_sweep_generic5_ground_column_load(const real *restrict H, const real *restrict e,
     const real *restrict tau, real *restrict y)
 {
     const real t0 = H[0] * e[0];
@@ -12323,19 +12329,19 @@ int mstmm_sweep_generic5_push_on_ground(const real *restrict H, const real *rest
     return 0;
 }
 
-static int mstmm_sweep_generic5_push_on_ground_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic5_ground_column_load_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic5_push_on_ground(in[0], in[1], in[2], out[0]);
+    return mstmm_sweep_generic5_ground_column_load(in[0], in[1], in[2], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_generic5_push_on_ground_inputs[] = {
+static const mstmm_port mstmm_sweep_generic5_ground_column_load_inputs[] = {
     {"H", 30, "", 0, 0},
     {"e", 6, "N, N*m", 0, 0},
     {"tau", 5, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic5_push_on_ground_outputs[] = {
+static const mstmm_port mstmm_sweep_generic5_ground_column_load_outputs[] = {
     {"y", 5, "N, N*m", 0, 0},
 };
 
@@ -15469,7 +15475,7 @@ static const mstmm_port mstmm_sweep_generic5_complement_slope_outputs[] = {
     {"d_W", 36, "", 0, 0},
 };
 
-/* answered and its derivative along a direction
+/* add_known_part and its derivative along a direction
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  y[5] tau - H^T e
@@ -15478,7 +15484,7 @@ static const mstmm_port mstmm_sweep_generic5_complement_slope_outputs[] = {
  * in  d_z[5] derivative of z
  * out d_l[1] derivative of l, added to what is there
  */
-int mstmm_sweep_generic5_answered_slope(const real *restrict y, const real *restrict z,
+int mstmm_sweep_generic5_add_known_part_slope(const real *restrict y, const real *restrict z,
     const real *restrict d_y, const real *restrict d_z, real *restrict d_l)
 {
     const real t0 = z[4] * d_y[4];
@@ -15505,24 +15511,24 @@ int mstmm_sweep_generic5_answered_slope(const real *restrict y, const real *rest
     return 0;
 }
 
-static int mstmm_sweep_generic5_answered_slope_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic5_add_known_part_slope_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic5_answered_slope(in[0], in[1], in[2], in[3], out[0]);
+    return mstmm_sweep_generic5_add_known_part_slope(in[0], in[1], in[2], in[3], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_generic5_answered_slope_inputs[] = {
+static const mstmm_port mstmm_sweep_generic5_add_known_part_slope_inputs[] = {
     {"y", 5, "", 0, 0},
     {"z", 5, "", 0, 0},
     {"d_y", 5, "", 0, 0},
     {"d_z", 5, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic5_answered_slope_outputs[] = {
+static const mstmm_port mstmm_sweep_generic5_add_known_part_slope_outputs[] = {
     {"d_l", 1, "", 1, 0},
 };
 
-/* pull and its derivative along a direction
+/* add_multiplier_effort and its derivative along a direction
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  y[5] of the row
@@ -15531,7 +15537,7 @@ static const mstmm_port mstmm_sweep_generic5_answered_slope_outputs[] = {
  * in  d_x[1] (N, N*m) derivative of x
  * out d_y_0[5] derivative of y_0, added to what is there
  */
-int mstmm_sweep_generic5_pull_slope(const real *restrict y, const real *restrict x,
+int mstmm_sweep_generic5_add_multiplier_effort_slope(const real *restrict y, const real *restrict x,
     const real *restrict d_y, const real *restrict d_x, real *restrict d_y_0)
 {
     const real t0 = x[0] * d_y[0];
@@ -15557,20 +15563,20 @@ int mstmm_sweep_generic5_pull_slope(const real *restrict y, const real *restrict
     return 0;
 }
 
-static int mstmm_sweep_generic5_pull_slope_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic5_add_multiplier_effort_slope_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic5_pull_slope(in[0], in[1], in[2], in[3], out[0]);
+    return mstmm_sweep_generic5_add_multiplier_effort_slope(in[0], in[1], in[2], in[3], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_generic5_pull_slope_inputs[] = {
+static const mstmm_port mstmm_sweep_generic5_add_multiplier_effort_slope_inputs[] = {
     {"y", 5, "", 0, 0},
     {"x", 1, "N, N*m", 0, 0},
     {"d_y", 5, "", 0, 0},
     {"d_x", 1, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic5_pull_slope_outputs[] = {
+static const mstmm_port mstmm_sweep_generic5_add_multiplier_effort_slope_outputs[] = {
     {"d_y_0", 5, "", 1, 0},
 };
 
@@ -15648,26 +15654,26 @@ static const mstmm_kernel mstmm_sweep_generic5_kernels[] = {
         .guards = mstmm_sweep_generic5_factor_guards,
     },
     {
-        .name = "push",
-        .function = (void (*)(void))mstmm_sweep_generic5_push,
-        .call = mstmm_sweep_generic5_push_call,
+        .name = "column_load",
+        .function = (void (*)(void))mstmm_sweep_generic5_column_load,
+        .call = mstmm_sweep_generic5_column_load_call,
         .n_inputs = 6,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic5_push_inputs,
-        .outputs = mstmm_sweep_generic5_push_outputs,
-        .ir_hash = "995d1399b4c980d30e505a6ec628fd5f800705f5b2132e8e928ae567f4e76fcd",
+        .inputs = mstmm_sweep_generic5_column_load_inputs,
+        .outputs = mstmm_sweep_generic5_column_load_outputs,
+        .ir_hash = "9ff479be44a3cf0a75e56d5bfbd7757522ac60d5b815b46c92466a74c11bbbb5",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "answer",
-        .function = (void (*)(void))mstmm_sweep_generic5_answer,
-        .call = mstmm_sweep_generic5_answer_call,
+        .name = "column_acceleration",
+        .function = (void (*)(void))mstmm_sweep_generic5_column_acceleration,
+        .call = mstmm_sweep_generic5_column_acceleration_call,
         .n_inputs = 7,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic5_answer_inputs,
-        .outputs = mstmm_sweep_generic5_answer_outputs,
-        .ir_hash = "dc8f462ff00602ebddc2b87abe0d430cc955abb85a26c550d94e24f6242a186d",
+        .inputs = mstmm_sweep_generic5_column_acceleration_inputs,
+        .outputs = mstmm_sweep_generic5_column_acceleration_outputs,
+        .ir_hash = "b274449953a5914550c77ee71eb8a80fa57eaf77029c55c08ac788e2484eb943",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -15708,14 +15714,14 @@ static const mstmm_kernel mstmm_sweep_generic5_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "tangent_along",
-        .function = (void (*)(void))mstmm_sweep_generic5_tangent_along,
-        .call = mstmm_sweep_generic5_tangent_along_call,
+        .name = "tangent_coordinate_change",
+        .function = (void (*)(void))mstmm_sweep_generic5_tangent_coordinate_change,
+        .call = mstmm_sweep_generic5_tangent_coordinate_change_call,
         .n_inputs = 2,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic5_tangent_along_inputs,
-        .outputs = mstmm_sweep_generic5_tangent_along_outputs,
-        .ir_hash = "31a78ee408020928e2f8a21a18de49268d8dbff0675584a13a2dd393c9d97454",
+        .inputs = mstmm_sweep_generic5_tangent_coordinate_change_inputs,
+        .outputs = mstmm_sweep_generic5_tangent_coordinate_change_outputs,
+        .ir_hash = "e1004c92407e1aaa3ddbfcbbc15e63db08672d9cf9f125972c327286694f3202",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -15732,14 +15738,14 @@ static const mstmm_kernel mstmm_sweep_generic5_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "tangent_turning",
-        .function = (void (*)(void))mstmm_sweep_generic5_tangent_turning,
-        .call = mstmm_sweep_generic5_tangent_turning_call,
+        .name = "tangent_rotational",
+        .function = (void (*)(void))mstmm_sweep_generic5_tangent_rotational,
+        .call = mstmm_sweep_generic5_tangent_rotational_call,
         .n_inputs = 9,
         .n_outputs = 3,
-        .inputs = mstmm_sweep_generic5_tangent_turning_inputs,
-        .outputs = mstmm_sweep_generic5_tangent_turning_outputs,
-        .ir_hash = "8a507cb91a74057776f3f520cb50696fc41cc9a91e0f028ff9bc45832624d6c8",
+        .inputs = mstmm_sweep_generic5_tangent_rotational_inputs,
+        .outputs = mstmm_sweep_generic5_tangent_rotational_outputs,
+        .ir_hash = "3c4c09e87981254d6af74f1f2644875bf87550ef1ad12f7fa8c64a17fabc0eb3",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -15768,50 +15774,50 @@ static const mstmm_kernel mstmm_sweep_generic5_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "tangent_push",
-        .function = (void (*)(void))mstmm_sweep_generic5_tangent_push,
-        .call = mstmm_sweep_generic5_tangent_push_call,
+        .name = "tangent_load",
+        .function = (void (*)(void))mstmm_sweep_generic5_tangent_load,
+        .call = mstmm_sweep_generic5_tangent_load_call,
         .n_inputs = 7,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic5_tangent_push_inputs,
-        .outputs = mstmm_sweep_generic5_tangent_push_outputs,
-        .ir_hash = "a82a2e91dc5d8a2ccf25049225dbc3acde8362dd50bd153866a167973ecb2441",
+        .inputs = mstmm_sweep_generic5_tangent_load_inputs,
+        .outputs = mstmm_sweep_generic5_tangent_load_outputs,
+        .ir_hash = "791cae013fdc5e7ca6954feadaabc3575e3fa75116d4c77dd1dcec2137ea3dbd",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "tangent_answer",
-        .function = (void (*)(void))mstmm_sweep_generic5_tangent_answer,
-        .call = mstmm_sweep_generic5_tangent_answer_call,
+        .name = "tangent_solution",
+        .function = (void (*)(void))mstmm_sweep_generic5_tangent_solution,
+        .call = mstmm_sweep_generic5_tangent_solution_call,
         .n_inputs = 9,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic5_tangent_answer_inputs,
-        .outputs = mstmm_sweep_generic5_tangent_answer_outputs,
-        .ir_hash = "79d75e249554eb077e6a1ae012e282cd989c68ce263d30cecefc5f78fd907afb",
+        .inputs = mstmm_sweep_generic5_tangent_solution_inputs,
+        .outputs = mstmm_sweep_generic5_tangent_solution_outputs,
+        .ir_hash = "9dea60e259445ef56dcc8a909ac6ef48720964cc31c5722bf06135a5a3e11771",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "tangent_push_known",
-        .function = (void (*)(void))mstmm_sweep_generic5_tangent_push_known,
-        .call = mstmm_sweep_generic5_tangent_push_known_call,
+        .name = "tangent_load_with_increments",
+        .function = (void (*)(void))mstmm_sweep_generic5_tangent_load_with_increments,
+        .call = mstmm_sweep_generic5_tangent_load_with_increments_call,
         .n_inputs = 8,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic5_tangent_push_known_inputs,
-        .outputs = mstmm_sweep_generic5_tangent_push_known_outputs,
-        .ir_hash = "2fad4feaeb26fe816dbd3564f9dfb268c43b7b19bf4de67da93cf6fdee4f369d",
+        .inputs = mstmm_sweep_generic5_tangent_load_with_increments_inputs,
+        .outputs = mstmm_sweep_generic5_tangent_load_with_increments_outputs,
+        .ir_hash = "1397b0804182095e49d70089abeea622affa0f40550ee2b9bfd3021496d8ef7c",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "tangent_answer_known",
-        .function = (void (*)(void))mstmm_sweep_generic5_tangent_answer_known,
-        .call = mstmm_sweep_generic5_tangent_answer_known_call,
+        .name = "tangent_solution_with_increments",
+        .function = (void (*)(void))mstmm_sweep_generic5_tangent_solution_with_increments,
+        .call = mstmm_sweep_generic5_tangent_solution_with_increments_call,
         .n_inputs = 10,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic5_tangent_answer_known_inputs,
-        .outputs = mstmm_sweep_generic5_tangent_answer_known_outputs,
-        .ir_hash = "f6373e1a986cf6772f996780d6753a839731cb30ac57e0de76a777b9d6e143f2",
+        .inputs = mstmm_sweep_generic5_tangent_solution_with_increments_inputs,
+        .outputs = mstmm_sweep_generic5_tangent_solution_with_increments_outputs,
+        .ir_hash = "0ab3493442abf63730834a9cf7cfaa07fde254f30cb7dc68309869cba473609b",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -15852,50 +15858,50 @@ static const mstmm_kernel mstmm_sweep_generic5_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "answered",
-        .function = (void (*)(void))mstmm_sweep_generic5_answered,
-        .call = mstmm_sweep_generic5_answered_call,
+        .name = "add_known_part",
+        .function = (void (*)(void))mstmm_sweep_generic5_add_known_part,
+        .call = mstmm_sweep_generic5_add_known_part_call,
         .n_inputs = 2,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_generic5_answered_inputs,
-        .outputs = mstmm_sweep_generic5_answered_outputs,
-        .ir_hash = "701dd50188e552089553f1f52906c97ad41fe0cedf4a2d1acfddee0e50beba4a",
+        .inputs = mstmm_sweep_generic5_add_known_part_inputs,
+        .outputs = mstmm_sweep_generic5_add_known_part_outputs,
+        .ir_hash = "03a68435c595f8565e0fcf435bda65e99b72c844a71d9a1af1cc534c3bd6658b",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "pull",
-        .function = (void (*)(void))mstmm_sweep_generic5_pull,
-        .call = mstmm_sweep_generic5_pull_call,
+        .name = "add_multiplier_effort",
+        .function = (void (*)(void))mstmm_sweep_generic5_add_multiplier_effort,
+        .call = mstmm_sweep_generic5_add_multiplier_effort_call,
         .n_inputs = 2,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_generic5_pull_inputs,
-        .outputs = mstmm_sweep_generic5_pull_outputs,
-        .ir_hash = "b1b0aff8790ac447ee2cfabd94de1dab512f19e31e7260cf8ddea96ecf9cd12a",
+        .inputs = mstmm_sweep_generic5_add_multiplier_effort_inputs,
+        .outputs = mstmm_sweep_generic5_add_multiplier_effort_outputs,
+        .ir_hash = "b7f48ed546dfefbf4127ee4e221fd9d53454405c3a90d42a5e41ef6ae9167653",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "exerted",
-        .function = (void (*)(void))mstmm_sweep_generic5_exerted,
-        .call = mstmm_sweep_generic5_exerted_call,
+        .name = "required_load",
+        .function = (void (*)(void))mstmm_sweep_generic5_required_load,
+        .call = mstmm_sweep_generic5_required_load_call,
         .n_inputs = 3,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_generic5_exerted_inputs,
-        .outputs = mstmm_sweep_generic5_exerted_outputs,
-        .ir_hash = "cbd7fd8e491f8148590bbbadd34e758e0ce4523cfab01eb86fc8018748b2bbed",
+        .inputs = mstmm_sweep_generic5_required_load_inputs,
+        .outputs = mstmm_sweep_generic5_required_load_outputs,
+        .ir_hash = "db6d554523e572ab7dc5bbb28d998ca95e35b3748cb140f4ac78a7ac843911c2",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "push_on_ground",
-        .function = (void (*)(void))mstmm_sweep_generic5_push_on_ground,
-        .call = mstmm_sweep_generic5_push_on_ground_call,
+        .name = "ground_column_load",
+        .function = (void (*)(void))mstmm_sweep_generic5_ground_column_load,
+        .call = mstmm_sweep_generic5_ground_column_load_call,
         .n_inputs = 3,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_generic5_push_on_ground_inputs,
-        .outputs = mstmm_sweep_generic5_push_on_ground_outputs,
-        .ir_hash = "02c7a7af655d2f86dce6140180fc92d524534cdf2b8520731419acf125024f53",
+        .inputs = mstmm_sweep_generic5_ground_column_load_inputs,
+        .outputs = mstmm_sweep_generic5_ground_column_load_outputs,
+        .ir_hash = "084d158c2187e93422de6017b03cd8df3bab3f7599940b3ca9012c6b208e0884",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -15936,26 +15942,26 @@ static const mstmm_kernel mstmm_sweep_generic5_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "answered_slope",
-        .function = (void (*)(void))mstmm_sweep_generic5_answered_slope,
-        .call = mstmm_sweep_generic5_answered_slope_call,
+        .name = "add_known_part_slope",
+        .function = (void (*)(void))mstmm_sweep_generic5_add_known_part_slope,
+        .call = mstmm_sweep_generic5_add_known_part_slope_call,
         .n_inputs = 4,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_generic5_answered_slope_inputs,
-        .outputs = mstmm_sweep_generic5_answered_slope_outputs,
-        .ir_hash = "231dba3430d6f5306b27581fb0b75f9d1ad41e1b35f3c100d79ca09a7138c5f0",
+        .inputs = mstmm_sweep_generic5_add_known_part_slope_inputs,
+        .outputs = mstmm_sweep_generic5_add_known_part_slope_outputs,
+        .ir_hash = "6d25b7fce096ab7d5b169fde2e2c4ded36c26ffa2180739a5d15e4a34dbb4021",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "pull_slope",
-        .function = (void (*)(void))mstmm_sweep_generic5_pull_slope,
-        .call = mstmm_sweep_generic5_pull_slope_call,
+        .name = "add_multiplier_effort_slope",
+        .function = (void (*)(void))mstmm_sweep_generic5_add_multiplier_effort_slope,
+        .call = mstmm_sweep_generic5_add_multiplier_effort_slope_call,
         .n_inputs = 4,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_generic5_pull_slope_inputs,
-        .outputs = mstmm_sweep_generic5_pull_slope_outputs,
-        .ir_hash = "b1c437f27f3f1a27657e7bb8df313f26e047b28314b4d8c93bbee7805e582f9f",
+        .inputs = mstmm_sweep_generic5_add_multiplier_effort_slope_inputs,
+        .outputs = mstmm_sweep_generic5_add_multiplier_effort_slope_outputs,
+        .ir_hash = "eb4797fe57f117ab6ccdcbdfbfd6d5bc10467a9727d3e92a4cf76e5b34b33b31",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -15965,7 +15971,7 @@ const mstmm_element mstmm_sweep_generic5 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic5",
-    .hash = "9f0b9d0355e2a1501f5478d4b4b7d3f2a2461a7d0d2f552eecc33e6b791eec43",
+    .hash = "4030b4478db684a9d132e4f4643d15578f9275e2e092ee9d762d9a8566f48dd0",
     .nq = 0,
     .nu = 0,
     .np = 0,

@@ -30,10 +30,10 @@ int mstmm_sweep_generic6_factor(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict J, const real *restrict W,
     const real *restrict floor_, const real *restrict S, real *restrict F, real *restrict G,
     real *restrict S_I);
-int mstmm_sweep_generic6_push(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic6_column_load(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict G, const real *restrict e,
     const real *restrict tau, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic6_answer(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic6_column_acceleration(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_sweep_generic6_qr_eliminate(const real *restrict H, const real *restrict J,
@@ -49,14 +49,14 @@ int mstmm_sweep_generic6_tangent_column(const real *restrict theta, const real *
     const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
     const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
     real *restrict G, real *restrict row);
-int mstmm_sweep_generic6_tangent_along(const real *restrict H, const real *restrict d_q,
+int mstmm_sweep_generic6_tangent_coordinate_change(const real *restrict H, const real *restrict d_q,
     real *restrict theta, real *restrict x);
 int mstmm_sweep_generic6_tangent_steady(const real *restrict theta, const real *restrict x,
     const real *restrict H, const real *restrict v, const real *restrict w, const real *restrict Q,
     const real *restrict f, const real *restrict d_u, const real *restrict d_s,
     const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
     real *restrict row);
-int mstmm_sweep_generic6_tangent_turning(const real *restrict theta, const real *restrict H,
+int mstmm_sweep_generic6_tangent_rotational(const real *restrict theta, const real *restrict H,
     const real *restrict w, const real *restrict Q, const real *restrict f,
     const real *restrict d_u, const real *restrict d_s, const real *restrict J,
     const real *restrict laws, real *restrict B, real *restrict G, real *restrict row);
@@ -66,29 +66,32 @@ int mstmm_sweep_generic6_tangent_rows(const real *restrict H, const real *restri
 int mstmm_sweep_generic6_tangent_reduce(const real *restrict inverse, const real *restrict right,
     const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
     real *restrict S);
-int mstmm_sweep_generic6_tangent_push(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic6_tangent_load(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict V, const real *restrict inverse,
     const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic6_tangent_answer(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic6_tangent_solution(const real *restrict Rc, const real *restrict r,
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, const real *restrict B, const real *restrict gain,
     const real *restrict y, real *restrict x, real *restrict z);
-int mstmm_sweep_generic6_tangent_push_known(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict V, const real *restrict inverse,
-    const real *restrict e, const real *restrict e_f, const real *restrict e_b, real *restrict y,
-    real *restrict e_I);
-int mstmm_sweep_generic6_tangent_answer_known(const real *restrict Rc, const real *restrict r,
-    const real *restrict w_I, const real *restrict v, const real *restrict w,
-    const real *restrict z_I, const real *restrict B, const real *restrict gain,
-    const real *restrict y, const real *restrict b, real *restrict x, real *restrict z);
+int mstmm_sweep_generic6_tangent_load_with_increments(const real *restrict Rc,
+    const real *restrict r, const real *restrict H, const real *restrict V,
+    const real *restrict inverse, const real *restrict e, const real *restrict e_f,
+    const real *restrict e_b, real *restrict y, real *restrict e_I);
+int mstmm_sweep_generic6_tangent_solution_with_increments(const real *restrict Rc,
+    const real *restrict r, const real *restrict w_I, const real *restrict v,
+    const real *restrict w, const real *restrict z_I, const real *restrict B,
+    const real *restrict gain, const real *restrict y, const real *restrict b, real *restrict x,
+    real *restrict z);
 int mstmm_sweep_generic6_complement(const real *restrict H, real *restrict W);
 int mstmm_sweep_generic6_divide(const real *restrict F, const real *restrict y, real *restrict z);
 int mstmm_sweep_generic6_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
-int mstmm_sweep_generic6_answered(const real *restrict y, const real *restrict z, real *restrict l);
-int mstmm_sweep_generic6_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
-int mstmm_sweep_generic6_exerted(const real *restrict S, const real *restrict H,
+int mstmm_sweep_generic6_add_known_part(const real *restrict y, const real *restrict z,
+    real *restrict l);
+int mstmm_sweep_generic6_add_multiplier_effort(const real *restrict y, const real *restrict x,
+    real *restrict y_0);
+int mstmm_sweep_generic6_required_load(const real *restrict S, const real *restrict H,
     const real *restrict udot, real *restrict e);
-int mstmm_sweep_generic6_push_on_ground(const real *restrict H, const real *restrict e,
+int mstmm_sweep_generic6_ground_column_load(const real *restrict H, const real *restrict e,
     const real *restrict tau, real *restrict y);
 int mstmm_sweep_generic6_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
@@ -101,9 +104,9 @@ int mstmm_sweep_generic6_effort_slope(const real *restrict H, const real *restri
     const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
 int mstmm_sweep_generic6_complement_slope(const real *restrict H, const real *restrict d_H,
     real *restrict d_W);
-int mstmm_sweep_generic6_answered_slope(const real *restrict y, const real *restrict z,
+int mstmm_sweep_generic6_add_known_part_slope(const real *restrict y, const real *restrict z,
     const real *restrict d_y, const real *restrict d_z, real *restrict d_l);
-int mstmm_sweep_generic6_pull_slope(const real *restrict y, const real *restrict x,
+int mstmm_sweep_generic6_add_multiplier_effort_slope(const real *restrict y, const real *restrict x,
     const real *restrict d_y, const real *restrict d_x, real *restrict d_y_0);
 
 #ifndef MSTMM_TWO
@@ -5611,7 +5614,7 @@ static const mstmm_guard mstmm_sweep_generic6_factor_guards[] = {
  * out y[6] (N, N*m) tau - H^T e
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic6_push(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic6_column_load(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict G, const real *restrict e,
     const real *restrict tau, real *restrict y, real *restrict e_I)
 {
@@ -5849,13 +5852,13 @@ int mstmm_sweep_generic6_push(const real *restrict Rc, const real *restrict r,
     return 0;
 }
 
-static int mstmm_sweep_generic6_push_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic6_column_load_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic6_push(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]);
+    return mstmm_sweep_generic6_column_load(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic6_push_inputs[] = {
+static const mstmm_port mstmm_sweep_generic6_column_load_inputs[] = {
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"H", 36, "", 0, 0},
@@ -5864,7 +5867,7 @@ static const mstmm_port mstmm_sweep_generic6_push_inputs[] = {
     {"tau", 6, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic6_push_outputs[] = {
+static const mstmm_port mstmm_sweep_generic6_column_load_outputs[] = {
     {"y", 6, "N, N*m", 0, 0},
     {"e_I", 6, "N, N*m", 1, 0},
 };
@@ -5882,7 +5885,7 @@ static const mstmm_port mstmm_sweep_generic6_push_outputs[] = {
  * out udot[6] accelerations of the free coordinates
  * out delta[6] deviation of the body's acceleration, at P
  */
-int mstmm_sweep_generic6_answer(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic6_column_acceleration(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta)
 {
@@ -6153,13 +6156,13 @@ int mstmm_sweep_generic6_answer(const real *restrict Rc, const real *restrict r,
     return 0;
 }
 
-static int mstmm_sweep_generic6_answer_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic6_column_acceleration_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic6_answer(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
+    return mstmm_sweep_generic6_column_acceleration(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic6_answer_inputs[] = {
+static const mstmm_port mstmm_sweep_generic6_column_acceleration_inputs[] = {
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"H", 36, "", 0, 0},
@@ -6169,7 +6172,7 @@ static const mstmm_port mstmm_sweep_generic6_answer_inputs[] = {
     {"delta_I", 6, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic6_answer_outputs[] = {
+static const mstmm_port mstmm_sweep_generic6_column_acceleration_outputs[] = {
     {"udot", 6, "", 0, 0},
     {"delta", 6, "", 0, 0},
 };
@@ -9635,7 +9638,7 @@ static const mstmm_port mstmm_sweep_generic6_tangent_column_outputs[] = {
  * out theta[3] rotation of the body along the direction, body axes
  * out x[3] displacement of P along the direction, body axes
  */
-int mstmm_sweep_generic6_tangent_along(const real *restrict H, const real *restrict d_q,
+int mstmm_sweep_generic6_tangent_coordinate_change(const real *restrict H, const real *restrict d_q,
     real *restrict theta, real *restrict x)
 {
     const real t0 = H[18] * d_q[0];
@@ -9713,18 +9716,18 @@ int mstmm_sweep_generic6_tangent_along(const real *restrict H, const real *restr
     return 0;
 }
 
-static int mstmm_sweep_generic6_tangent_along_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic6_tangent_coordinate_change_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic6_tangent_along(in[0], in[1], out[0], out[1]);
+    return mstmm_sweep_generic6_tangent_coordinate_change(in[0], in[1], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic6_tangent_along_inputs[] = {
+static const mstmm_port mstmm_sweep_generic6_tangent_coordinate_change_inputs[] = {
     {"H", 36, "", 0, 0},
     {"d_q", 6, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic6_tangent_along_outputs[] = {
+static const mstmm_port mstmm_sweep_generic6_tangent_coordinate_change_outputs[] = {
     {"theta", 3, "", 0, 0},
     {"x", 3, "", 0, 0},
 };
@@ -10143,7 +10146,7 @@ static const mstmm_port mstmm_sweep_generic6_tangent_steady_outputs[] = {
  * out G[6] change of the carried load
  * out row[6] change of the rows by load, rotors and laws
  */
-int mstmm_sweep_generic6_tangent_turning(const real *restrict theta, const real *restrict H,
+int mstmm_sweep_generic6_tangent_rotational(const real *restrict theta, const real *restrict H,
     const real *restrict w, const real *restrict Q, const real *restrict f,
     const real *restrict d_u, const real *restrict d_s, const real *restrict J,
     const real *restrict laws, real *restrict B, real *restrict G, real *restrict row)
@@ -10325,13 +10328,13 @@ int mstmm_sweep_generic6_tangent_turning(const real *restrict theta, const real 
     return 0;
 }
 
-static int mstmm_sweep_generic6_tangent_turning_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic6_tangent_rotational_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic6_tangent_turning(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1], out[2]);
+    return mstmm_sweep_generic6_tangent_rotational(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1], out[2]);
 }
 
-static const mstmm_port mstmm_sweep_generic6_tangent_turning_inputs[] = {
+static const mstmm_port mstmm_sweep_generic6_tangent_rotational_inputs[] = {
     {"theta", 3, "", 0, 0},
     {"H", 36, "", 0, 0},
     {"w", 3, "", 0, 0},
@@ -10343,7 +10346,7 @@ static const mstmm_port mstmm_sweep_generic6_tangent_turning_inputs[] = {
     {"laws", 6, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic6_tangent_turning_outputs[] = {
+static const mstmm_port mstmm_sweep_generic6_tangent_rotational_outputs[] = {
     {"B", 9, "", 0, 0},
     {"G", 6, "", 0, 0},
     {"row", 6, "", 0, 0},
@@ -11363,7 +11366,7 @@ static const mstmm_port mstmm_sweep_generic6_tangent_reduce_outputs[] = {
  * out y[6] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic6_tangent_push(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic6_tangent_load(const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict V, const real *restrict inverse,
     const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I)
 {
@@ -11673,13 +11676,13 @@ int mstmm_sweep_generic6_tangent_push(const real *restrict Rc, const real *restr
     return 0;
 }
 
-static int mstmm_sweep_generic6_tangent_push_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic6_tangent_load_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic6_tangent_push(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
+    return mstmm_sweep_generic6_tangent_load(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic6_tangent_push_inputs[] = {
+static const mstmm_port mstmm_sweep_generic6_tangent_load_inputs[] = {
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"H", 36, "", 0, 0},
@@ -11689,7 +11692,7 @@ static const mstmm_port mstmm_sweep_generic6_tangent_push_inputs[] = {
     {"e_f", 6, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic6_tangent_push_outputs[] = {
+static const mstmm_port mstmm_sweep_generic6_tangent_load_outputs[] = {
     {"y", 6, "", 0, 0},
     {"e_I", 6, "N, N*m", 1, 0},
 };
@@ -11709,7 +11712,7 @@ static const mstmm_port mstmm_sweep_generic6_tangent_push_outputs[] = {
  * out x[6] unknowns
  * out z[9] change of the body's motion, own axes
  */
-int mstmm_sweep_generic6_tangent_answer(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_generic6_tangent_solution(const real *restrict Rc, const real *restrict r,
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, const real *restrict B, const real *restrict gain,
     const real *restrict y, real *restrict x, real *restrict z)
@@ -12074,13 +12077,13 @@ int mstmm_sweep_generic6_tangent_answer(const real *restrict Rc, const real *res
     return 0;
 }
 
-static int mstmm_sweep_generic6_tangent_answer_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic6_tangent_solution_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic6_tangent_answer(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1]);
+    return mstmm_sweep_generic6_tangent_solution(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic6_tangent_answer_inputs[] = {
+static const mstmm_port mstmm_sweep_generic6_tangent_solution_inputs[] = {
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"w_I", 3, "rad/s", 0, 0},
@@ -12092,7 +12095,7 @@ static const mstmm_port mstmm_sweep_generic6_tangent_answer_inputs[] = {
     {"y", 6, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic6_tangent_answer_outputs[] = {
+static const mstmm_port mstmm_sweep_generic6_tangent_solution_outputs[] = {
     {"x", 6, "", 0, 0},
     {"z", 9, "", 0, 0},
 };
@@ -12111,10 +12114,10 @@ static const mstmm_port mstmm_sweep_generic6_tangent_answer_outputs[] = {
  * out y[6] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic6_tangent_push_known(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict V, const real *restrict inverse,
-    const real *restrict e, const real *restrict e_f, const real *restrict e_b, real *restrict y,
-    real *restrict e_I)
+int mstmm_sweep_generic6_tangent_load_with_increments(const real *restrict Rc,
+    const real *restrict r, const real *restrict H, const real *restrict V,
+    const real *restrict inverse, const real *restrict e, const real *restrict e_f,
+    const real *restrict e_b, real *restrict y, real *restrict e_I)
 {
     const real t0 = H[0] * e[0];
     const real t1 = H[6] * e[1];
@@ -12428,13 +12431,13 @@ int mstmm_sweep_generic6_tangent_push_known(const real *restrict Rc, const real 
     return 0;
 }
 
-static int mstmm_sweep_generic6_tangent_push_known_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic6_tangent_load_with_increments_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic6_tangent_push_known(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1]);
+    return mstmm_sweep_generic6_tangent_load_with_increments(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic6_tangent_push_known_inputs[] = {
+static const mstmm_port mstmm_sweep_generic6_tangent_load_with_increments_inputs[] = {
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"H", 36, "", 0, 0},
@@ -12445,7 +12448,7 @@ static const mstmm_port mstmm_sweep_generic6_tangent_push_known_inputs[] = {
     {"e_b", 6, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic6_tangent_push_known_outputs[] = {
+static const mstmm_port mstmm_sweep_generic6_tangent_load_with_increments_outputs[] = {
     {"y", 6, "", 0, 0},
     {"e_I", 6, "N, N*m", 1, 0},
 };
@@ -12466,10 +12469,11 @@ static const mstmm_port mstmm_sweep_generic6_tangent_push_known_outputs[] = {
  * out x[6] unknowns
  * out z[9] change of the body's motion, own axes
  */
-int mstmm_sweep_generic6_tangent_answer_known(const real *restrict Rc, const real *restrict r,
-    const real *restrict w_I, const real *restrict v, const real *restrict w,
-    const real *restrict z_I, const real *restrict B, const real *restrict gain,
-    const real *restrict y, const real *restrict b, real *restrict x, real *restrict z)
+int mstmm_sweep_generic6_tangent_solution_with_increments(const real *restrict Rc,
+    const real *restrict r, const real *restrict w_I, const real *restrict v,
+    const real *restrict w, const real *restrict z_I, const real *restrict B,
+    const real *restrict gain, const real *restrict y, const real *restrict b, real *restrict x,
+    real *restrict z)
 {
     const real t0 = Rc[0] * z_I[0];
     const real t1 = Rc[3] * z_I[1];
@@ -12840,13 +12844,13 @@ int mstmm_sweep_generic6_tangent_answer_known(const real *restrict Rc, const rea
     return 0;
 }
 
-static int mstmm_sweep_generic6_tangent_answer_known_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic6_tangent_solution_with_increments_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic6_tangent_answer_known(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], out[0], out[1]);
+    return mstmm_sweep_generic6_tangent_solution_with_increments(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_generic6_tangent_answer_known_inputs[] = {
+static const mstmm_port mstmm_sweep_generic6_tangent_solution_with_increments_inputs[] = {
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"w_I", 3, "rad/s", 0, 0},
@@ -12859,7 +12863,7 @@ static const mstmm_port mstmm_sweep_generic6_tangent_answer_known_inputs[] = {
     {"b", 9, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic6_tangent_answer_known_outputs[] = {
+static const mstmm_port mstmm_sweep_generic6_tangent_solution_with_increments_outputs[] = {
     {"x", 6, "", 0, 0},
     {"z", 9, "", 0, 0},
 };
@@ -13813,7 +13817,8 @@ static const mstmm_port mstmm_sweep_generic6_couple_outputs[] = {
  * in  z[6] of the row
  * out l[1] known part of the row, added to what is there
  */
-int mstmm_sweep_generic6_answered(const real *restrict y, const real *restrict z, real *restrict l)
+int mstmm_sweep_generic6_add_known_part(const real *restrict y, const real *restrict z,
+    real *restrict l)
 {
     const real t0 = y[0] * z[0];
     const real t1 = y[1] * z[1];
@@ -13831,18 +13836,18 @@ int mstmm_sweep_generic6_answered(const real *restrict y, const real *restrict z
     return 0;
 }
 
-static int mstmm_sweep_generic6_answered_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic6_add_known_part_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic6_answered(in[0], in[1], out[0]);
+    return mstmm_sweep_generic6_add_known_part(in[0], in[1], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_generic6_answered_inputs[] = {
+static const mstmm_port mstmm_sweep_generic6_add_known_part_inputs[] = {
     {"y", 6, "", 0, 0},
     {"z", 6, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic6_answered_outputs[] = {
+static const mstmm_port mstmm_sweep_generic6_add_known_part_outputs[] = {
     {"l", 1, "", 1, 0},
 };
 
@@ -13853,7 +13858,8 @@ static const mstmm_port mstmm_sweep_generic6_answered_outputs[] = {
  * in  x[1] (N, N*m) multiplier
  * out y_0[6] tau - H^T e, added to what is there
  */
-int mstmm_sweep_generic6_pull(const real *restrict y, const real *restrict x, real *restrict y_0)
+int mstmm_sweep_generic6_add_multiplier_effort(const real *restrict y, const real *restrict x,
+    real *restrict y_0)
 {
     const real t0 = y[0] * x[0];
     y_0[0] += t0;
@@ -13870,18 +13876,18 @@ int mstmm_sweep_generic6_pull(const real *restrict y, const real *restrict x, re
     return 0;
 }
 
-static int mstmm_sweep_generic6_pull_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic6_add_multiplier_effort_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic6_pull(in[0], in[1], out[0]);
+    return mstmm_sweep_generic6_add_multiplier_effort(in[0], in[1], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_generic6_pull_inputs[] = {
+static const mstmm_port mstmm_sweep_generic6_add_multiplier_effort_inputs[] = {
     {"y", 6, "", 0, 0},
     {"x", 1, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic6_pull_outputs[] = {
+static const mstmm_port mstmm_sweep_generic6_add_multiplier_effort_outputs[] = {
     {"y_0", 6, "", 1, 0},
 };
 
@@ -13891,7 +13897,7 @@ static const mstmm_port mstmm_sweep_generic6_pull_outputs[] = {
  * in  udot[6] accelerations of the coordinates
  * out e[6] (N, N*m) force part of f = S a + e, at P
  */
-int mstmm_sweep_generic6_exerted(const real *restrict S, const real *restrict H,
+int mstmm_sweep_generic6_required_load(const real *restrict S, const real *restrict H,
     const real *restrict udot, real *restrict e)
 {
     const real t0 = S[0] * H[0];
@@ -14365,19 +14371,19 @@ int mstmm_sweep_generic6_exerted(const real *restrict S, const real *restrict H,
     return 0;
 }
 
-static int mstmm_sweep_generic6_exerted_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic6_required_load_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic6_exerted(in[0], in[1], in[2], out[0]);
+    return mstmm_sweep_generic6_required_load(in[0], in[1], in[2], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_generic6_exerted_inputs[] = {
+static const mstmm_port mstmm_sweep_generic6_required_load_inputs[] = {
     {"S", 21, "", 0, 0},
     {"H", 36, "", 0, 0},
     {"udot", 6, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic6_exerted_outputs[] = {
+static const mstmm_port mstmm_sweep_generic6_required_load_outputs[] = {
     {"e", 6, "N, N*m", 0, 0},
 };
 
@@ -14389,7 +14395,7 @@ static const mstmm_port mstmm_sweep_generic6_exerted_outputs[] = {
  * in  tau[6] (N, N*m) efforts of the right-hand side on the free coordinates
  * out y[6] (N, N*m) tau - H^T e
  */
-int mstmm_sweep_generic6_push_on_ground(const real *restrict H, const real *restrict e,
+int mstmm_sweep_generic6_ground_column_load(const real *restrict H, const real *restrict e,
     const real *restrict tau, real *restrict y)
 {
     const real t0 = H[0] * e[0];
@@ -14473,19 +14479,19 @@ int mstmm_sweep_generic6_push_on_ground(const real *restrict H, const real *rest
     return 0;
 }
 
-static int mstmm_sweep_generic6_push_on_ground_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic6_ground_column_load_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic6_push_on_ground(in[0], in[1], in[2], out[0]);
+    return mstmm_sweep_generic6_ground_column_load(in[0], in[1], in[2], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_generic6_push_on_ground_inputs[] = {
+static const mstmm_port mstmm_sweep_generic6_ground_column_load_inputs[] = {
     {"H", 36, "", 0, 0},
     {"e", 6, "N, N*m", 0, 0},
     {"tau", 6, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic6_push_on_ground_outputs[] = {
+static const mstmm_port mstmm_sweep_generic6_ground_column_load_outputs[] = {
     {"y", 6, "N, N*m", 0, 0},
 };
 
@@ -17478,7 +17484,7 @@ static const mstmm_port mstmm_sweep_generic6_complement_slope_outputs[] = {
     {"d_W", 36, "", 0, 0},
 };
 
-/* answered and its derivative along a direction
+/* add_known_part and its derivative along a direction
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  y[6] tau - H^T e
@@ -17487,7 +17493,7 @@ static const mstmm_port mstmm_sweep_generic6_complement_slope_outputs[] = {
  * in  d_z[6] derivative of z
  * out d_l[1] derivative of l, added to what is there
  */
-int mstmm_sweep_generic6_answered_slope(const real *restrict y, const real *restrict z,
+int mstmm_sweep_generic6_add_known_part_slope(const real *restrict y, const real *restrict z,
     const real *restrict d_y, const real *restrict d_z, real *restrict d_l)
 {
     const real t0 = z[5] * d_y[5];
@@ -17518,24 +17524,24 @@ int mstmm_sweep_generic6_answered_slope(const real *restrict y, const real *rest
     return 0;
 }
 
-static int mstmm_sweep_generic6_answered_slope_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic6_add_known_part_slope_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic6_answered_slope(in[0], in[1], in[2], in[3], out[0]);
+    return mstmm_sweep_generic6_add_known_part_slope(in[0], in[1], in[2], in[3], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_generic6_answered_slope_inputs[] = {
+static const mstmm_port mstmm_sweep_generic6_add_known_part_slope_inputs[] = {
     {"y", 6, "", 0, 0},
     {"z", 6, "", 0, 0},
     {"d_y", 6, "", 0, 0},
     {"d_z", 6, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic6_answered_slope_outputs[] = {
+static const mstmm_port mstmm_sweep_generic6_add_known_part_slope_outputs[] = {
     {"d_l", 1, "", 1, 0},
 };
 
-/* pull and its derivative along a direction
+/* add_multiplier_effort and its derivative along a direction
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  y[6] of the row
@@ -17544,7 +17550,7 @@ static const mstmm_port mstmm_sweep_generic6_answered_slope_outputs[] = {
  * in  d_x[1] (N, N*m) derivative of x
  * out d_y_0[6] derivative of y_0, added to what is there
  */
-int mstmm_sweep_generic6_pull_slope(const real *restrict y, const real *restrict x,
+int mstmm_sweep_generic6_add_multiplier_effort_slope(const real *restrict y, const real *restrict x,
     const real *restrict d_y, const real *restrict d_x, real *restrict d_y_0)
 {
     const real t0 = x[0] * d_y[0];
@@ -17574,20 +17580,20 @@ int mstmm_sweep_generic6_pull_slope(const real *restrict y, const real *restrict
     return 0;
 }
 
-static int mstmm_sweep_generic6_pull_slope_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_generic6_add_multiplier_effort_slope_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_generic6_pull_slope(in[0], in[1], in[2], in[3], out[0]);
+    return mstmm_sweep_generic6_add_multiplier_effort_slope(in[0], in[1], in[2], in[3], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_generic6_pull_slope_inputs[] = {
+static const mstmm_port mstmm_sweep_generic6_add_multiplier_effort_slope_inputs[] = {
     {"y", 6, "", 0, 0},
     {"x", 1, "N, N*m", 0, 0},
     {"d_y", 6, "", 0, 0},
     {"d_x", 1, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_generic6_pull_slope_outputs[] = {
+static const mstmm_port mstmm_sweep_generic6_add_multiplier_effort_slope_outputs[] = {
     {"d_y_0", 6, "", 1, 0},
 };
 
@@ -17665,26 +17671,26 @@ static const mstmm_kernel mstmm_sweep_generic6_kernels[] = {
         .guards = mstmm_sweep_generic6_factor_guards,
     },
     {
-        .name = "push",
-        .function = (void (*)(void))mstmm_sweep_generic6_push,
-        .call = mstmm_sweep_generic6_push_call,
+        .name = "column_load",
+        .function = (void (*)(void))mstmm_sweep_generic6_column_load,
+        .call = mstmm_sweep_generic6_column_load_call,
         .n_inputs = 6,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic6_push_inputs,
-        .outputs = mstmm_sweep_generic6_push_outputs,
-        .ir_hash = "773c5faca2d984d27648b005f06e9f56cbaf58968ce78431e979c3b4ca697442",
+        .inputs = mstmm_sweep_generic6_column_load_inputs,
+        .outputs = mstmm_sweep_generic6_column_load_outputs,
+        .ir_hash = "7d915c610e1d203c6c96e373bc910b07216f8b2ce68f1676f9056884a974f208",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "answer",
-        .function = (void (*)(void))mstmm_sweep_generic6_answer,
-        .call = mstmm_sweep_generic6_answer_call,
+        .name = "column_acceleration",
+        .function = (void (*)(void))mstmm_sweep_generic6_column_acceleration,
+        .call = mstmm_sweep_generic6_column_acceleration_call,
         .n_inputs = 7,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic6_answer_inputs,
-        .outputs = mstmm_sweep_generic6_answer_outputs,
-        .ir_hash = "d2a8cc3aec0fe9c3f9e0fb3cc53174bb2a1bf2218c32cdb4c0ae87b0de230ae1",
+        .inputs = mstmm_sweep_generic6_column_acceleration_inputs,
+        .outputs = mstmm_sweep_generic6_column_acceleration_outputs,
+        .ir_hash = "c4bd4bc29e5247622787c78f86dd2d33ebaa8bd40fb03cfa7c9ab17244d37496",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -17725,14 +17731,14 @@ static const mstmm_kernel mstmm_sweep_generic6_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "tangent_along",
-        .function = (void (*)(void))mstmm_sweep_generic6_tangent_along,
-        .call = mstmm_sweep_generic6_tangent_along_call,
+        .name = "tangent_coordinate_change",
+        .function = (void (*)(void))mstmm_sweep_generic6_tangent_coordinate_change,
+        .call = mstmm_sweep_generic6_tangent_coordinate_change_call,
         .n_inputs = 2,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic6_tangent_along_inputs,
-        .outputs = mstmm_sweep_generic6_tangent_along_outputs,
-        .ir_hash = "8ab98fa3ac2aa7c8312412586bd0e93fbe4d163ef770779dd3c063d19835dce0",
+        .inputs = mstmm_sweep_generic6_tangent_coordinate_change_inputs,
+        .outputs = mstmm_sweep_generic6_tangent_coordinate_change_outputs,
+        .ir_hash = "86c610fcd89ebef93572b6432b76734bc5a4d393fc26df87c806bd38627f172f",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -17749,14 +17755,14 @@ static const mstmm_kernel mstmm_sweep_generic6_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "tangent_turning",
-        .function = (void (*)(void))mstmm_sweep_generic6_tangent_turning,
-        .call = mstmm_sweep_generic6_tangent_turning_call,
+        .name = "tangent_rotational",
+        .function = (void (*)(void))mstmm_sweep_generic6_tangent_rotational,
+        .call = mstmm_sweep_generic6_tangent_rotational_call,
         .n_inputs = 9,
         .n_outputs = 3,
-        .inputs = mstmm_sweep_generic6_tangent_turning_inputs,
-        .outputs = mstmm_sweep_generic6_tangent_turning_outputs,
-        .ir_hash = "61ce3df06359633a488acd37a782db7479ad3c2da6bcdfb8ee7d95d893cdb45b",
+        .inputs = mstmm_sweep_generic6_tangent_rotational_inputs,
+        .outputs = mstmm_sweep_generic6_tangent_rotational_outputs,
+        .ir_hash = "94cadcf48bbab56bf3ebc45584f6df54e39721642bce3c67c12aeeaff3cf9f4d",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -17785,50 +17791,50 @@ static const mstmm_kernel mstmm_sweep_generic6_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "tangent_push",
-        .function = (void (*)(void))mstmm_sweep_generic6_tangent_push,
-        .call = mstmm_sweep_generic6_tangent_push_call,
+        .name = "tangent_load",
+        .function = (void (*)(void))mstmm_sweep_generic6_tangent_load,
+        .call = mstmm_sweep_generic6_tangent_load_call,
         .n_inputs = 7,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic6_tangent_push_inputs,
-        .outputs = mstmm_sweep_generic6_tangent_push_outputs,
-        .ir_hash = "b86176262022c4950e3929111bfe25af02669f35c7fc5b0e0b965ae1c66c7337",
+        .inputs = mstmm_sweep_generic6_tangent_load_inputs,
+        .outputs = mstmm_sweep_generic6_tangent_load_outputs,
+        .ir_hash = "d94e838e11498103a34c46cdc0e6d827d5993dd6ac3dbe5604e1191cb384acba",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "tangent_answer",
-        .function = (void (*)(void))mstmm_sweep_generic6_tangent_answer,
-        .call = mstmm_sweep_generic6_tangent_answer_call,
+        .name = "tangent_solution",
+        .function = (void (*)(void))mstmm_sweep_generic6_tangent_solution,
+        .call = mstmm_sweep_generic6_tangent_solution_call,
         .n_inputs = 9,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic6_tangent_answer_inputs,
-        .outputs = mstmm_sweep_generic6_tangent_answer_outputs,
-        .ir_hash = "98c21cf9ee0dc7dd02020cbebf7529230ee844237c69851118ddff1485838f6f",
+        .inputs = mstmm_sweep_generic6_tangent_solution_inputs,
+        .outputs = mstmm_sweep_generic6_tangent_solution_outputs,
+        .ir_hash = "b3452b42ce114ede18d8d43654b8e8d666f407cc47d1d0c75d6894b79cb05890",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "tangent_push_known",
-        .function = (void (*)(void))mstmm_sweep_generic6_tangent_push_known,
-        .call = mstmm_sweep_generic6_tangent_push_known_call,
+        .name = "tangent_load_with_increments",
+        .function = (void (*)(void))mstmm_sweep_generic6_tangent_load_with_increments,
+        .call = mstmm_sweep_generic6_tangent_load_with_increments_call,
         .n_inputs = 8,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic6_tangent_push_known_inputs,
-        .outputs = mstmm_sweep_generic6_tangent_push_known_outputs,
-        .ir_hash = "338396a45ebfe0a488497e40c66fbf2b128ac96b5fa1f2fa455d412e21575635",
+        .inputs = mstmm_sweep_generic6_tangent_load_with_increments_inputs,
+        .outputs = mstmm_sweep_generic6_tangent_load_with_increments_outputs,
+        .ir_hash = "6c73946f5dcfb9e452229e3ea3424e97697c413052af2c862ff7c64edf58993e",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "tangent_answer_known",
-        .function = (void (*)(void))mstmm_sweep_generic6_tangent_answer_known,
-        .call = mstmm_sweep_generic6_tangent_answer_known_call,
+        .name = "tangent_solution_with_increments",
+        .function = (void (*)(void))mstmm_sweep_generic6_tangent_solution_with_increments,
+        .call = mstmm_sweep_generic6_tangent_solution_with_increments_call,
         .n_inputs = 10,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_generic6_tangent_answer_known_inputs,
-        .outputs = mstmm_sweep_generic6_tangent_answer_known_outputs,
-        .ir_hash = "9d7272380ad6ce622bd3f378c4edc2e2c84b18c56ef26b5fbb0006cc132918ab",
+        .inputs = mstmm_sweep_generic6_tangent_solution_with_increments_inputs,
+        .outputs = mstmm_sweep_generic6_tangent_solution_with_increments_outputs,
+        .ir_hash = "dc9939f8f4e872d0c85c09fe1edf94dbb23aedf62f0bdf49633b413d424bbcf2",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -17869,50 +17875,50 @@ static const mstmm_kernel mstmm_sweep_generic6_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "answered",
-        .function = (void (*)(void))mstmm_sweep_generic6_answered,
-        .call = mstmm_sweep_generic6_answered_call,
+        .name = "add_known_part",
+        .function = (void (*)(void))mstmm_sweep_generic6_add_known_part,
+        .call = mstmm_sweep_generic6_add_known_part_call,
         .n_inputs = 2,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_generic6_answered_inputs,
-        .outputs = mstmm_sweep_generic6_answered_outputs,
-        .ir_hash = "81713848e5ce2722fe4fca651a3c309a72ad9e999e058f6ed675223024c8d879",
+        .inputs = mstmm_sweep_generic6_add_known_part_inputs,
+        .outputs = mstmm_sweep_generic6_add_known_part_outputs,
+        .ir_hash = "5af96afe3f708d7b60d192dea99e00601c89b961dc3b15767f675c80ab8d617c",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "pull",
-        .function = (void (*)(void))mstmm_sweep_generic6_pull,
-        .call = mstmm_sweep_generic6_pull_call,
+        .name = "add_multiplier_effort",
+        .function = (void (*)(void))mstmm_sweep_generic6_add_multiplier_effort,
+        .call = mstmm_sweep_generic6_add_multiplier_effort_call,
         .n_inputs = 2,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_generic6_pull_inputs,
-        .outputs = mstmm_sweep_generic6_pull_outputs,
-        .ir_hash = "bbe26e7ae8bd00df10003e8e43ea520063d46f37901e525f4cda1b4867166bf1",
+        .inputs = mstmm_sweep_generic6_add_multiplier_effort_inputs,
+        .outputs = mstmm_sweep_generic6_add_multiplier_effort_outputs,
+        .ir_hash = "3103e6e1a9e1c54be3c51b23046253c61bc39adfb22aec65e3158cbb6ddbb338",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "exerted",
-        .function = (void (*)(void))mstmm_sweep_generic6_exerted,
-        .call = mstmm_sweep_generic6_exerted_call,
+        .name = "required_load",
+        .function = (void (*)(void))mstmm_sweep_generic6_required_load,
+        .call = mstmm_sweep_generic6_required_load_call,
         .n_inputs = 3,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_generic6_exerted_inputs,
-        .outputs = mstmm_sweep_generic6_exerted_outputs,
-        .ir_hash = "ec8bc8e9def6f8a5b3bdd5e4d2d2c224d2e985617a86c64c0898090f014008fe",
+        .inputs = mstmm_sweep_generic6_required_load_inputs,
+        .outputs = mstmm_sweep_generic6_required_load_outputs,
+        .ir_hash = "5eb47071cb0ba8fd78297915e107541fb31aee3617ac28414e355f9b5ef968ea",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "push_on_ground",
-        .function = (void (*)(void))mstmm_sweep_generic6_push_on_ground,
-        .call = mstmm_sweep_generic6_push_on_ground_call,
+        .name = "ground_column_load",
+        .function = (void (*)(void))mstmm_sweep_generic6_ground_column_load,
+        .call = mstmm_sweep_generic6_ground_column_load_call,
         .n_inputs = 3,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_generic6_push_on_ground_inputs,
-        .outputs = mstmm_sweep_generic6_push_on_ground_outputs,
-        .ir_hash = "0e89c8879099542ae75e796b52470232619a6a973ad876392eb384de7a9c0f44",
+        .inputs = mstmm_sweep_generic6_ground_column_load_inputs,
+        .outputs = mstmm_sweep_generic6_ground_column_load_outputs,
+        .ir_hash = "663de69f62554f4f1234121e002e33ad274bbcadc5db0958d572f5dde0e10f85",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -17953,26 +17959,26 @@ static const mstmm_kernel mstmm_sweep_generic6_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "answered_slope",
-        .function = (void (*)(void))mstmm_sweep_generic6_answered_slope,
-        .call = mstmm_sweep_generic6_answered_slope_call,
+        .name = "add_known_part_slope",
+        .function = (void (*)(void))mstmm_sweep_generic6_add_known_part_slope,
+        .call = mstmm_sweep_generic6_add_known_part_slope_call,
         .n_inputs = 4,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_generic6_answered_slope_inputs,
-        .outputs = mstmm_sweep_generic6_answered_slope_outputs,
-        .ir_hash = "b3d1558502185ae27387728837d5c8a07d37fc301fcf65fce21c3b99507220c5",
+        .inputs = mstmm_sweep_generic6_add_known_part_slope_inputs,
+        .outputs = mstmm_sweep_generic6_add_known_part_slope_outputs,
+        .ir_hash = "d7248b411f183a1d842e70beecdd39fc353d05f3cae94a3ee3b0b37600ba9aed",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "pull_slope",
-        .function = (void (*)(void))mstmm_sweep_generic6_pull_slope,
-        .call = mstmm_sweep_generic6_pull_slope_call,
+        .name = "add_multiplier_effort_slope",
+        .function = (void (*)(void))mstmm_sweep_generic6_add_multiplier_effort_slope,
+        .call = mstmm_sweep_generic6_add_multiplier_effort_slope_call,
         .n_inputs = 4,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_generic6_pull_slope_inputs,
-        .outputs = mstmm_sweep_generic6_pull_slope_outputs,
-        .ir_hash = "6f4802012577aa6b50db05bc066b6158f0a0f58244120bd8f5da589bd5e5736e",
+        .inputs = mstmm_sweep_generic6_add_multiplier_effort_slope_inputs,
+        .outputs = mstmm_sweep_generic6_add_multiplier_effort_slope_outputs,
+        .ir_hash = "a42e0dea3d7c2cb6d5b8dacfb8f9c5d63c85a973b6d268ba6e87612ba11b45ec",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -17982,7 +17988,7 @@ const mstmm_element mstmm_sweep_generic6 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic6",
-    .hash = "25f2e4564b18a7eb36fa7cc1800e9c5357edf5c3f75b26131b2734daf30ed2fa",
+    .hash = "a64c934bb0a8a2d433306c00d6f72e7f474431102ee87b99061d17a8f66eeac2",
     .nq = 0,
     .nu = 0,
     .np = 0,

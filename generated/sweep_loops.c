@@ -8,7 +8,7 @@
 #include "mstmm.h"
 
 extern const mstmm_element mstmm_sweep_loops;
-int mstmm_sweep_loops_meet(const real *restrict A_C, const real *restrict x_C,
+int mstmm_sweep_loops_relative_pose(const real *restrict A_C, const real *restrict x_C,
     const real *restrict A_B, const real *restrict x_B, const real *restrict r_e,
     const real *restrict Rc, const real *restrict r, real *restrict R_C, real *restrict r_A,
     real *restrict d);
@@ -20,35 +20,38 @@ int mstmm_sweep_loops_slip(const real *restrict R_C, const real *restrict r_e,
 int mstmm_sweep_loops_drift(const real *restrict R_C, const real *restrict r_e,
     const real *restrict d, const real *restrict slip, const real *restrict motion_C,
     const real *restrict motion_B, real *restrict drift);
-int mstmm_sweep_loops_closing(const real *restrict gap, const real *restrict rate,
+int mstmm_sweep_loops_required_acceleration(const real *restrict gap, const real *restrict rate,
     real *restrict relative);
 int mstmm_sweep_loops_row(const real *restrict w, const real *restrict R_C,
     const real *restrict r_e, const real *restrict Rc, const real *restrict r_A, real *restrict J_A,
     real *restrict J_B);
-int mstmm_sweep_loops_known(const real *restrict W, const real *restrict relative, real *restrict l);
-int mstmm_sweep_loops_told(const real *restrict J_A, const real *restrict J_B,
+int mstmm_sweep_loops_known_parts(const real *restrict W, const real *restrict relative,
+    real *restrict l);
+int mstmm_sweep_loops_row_acceleration(const real *restrict J_A, const real *restrict J_B,
     const real *restrict l, const real *restrict delta_A, const real *restrict delta_B,
     real *restrict c);
-int mstmm_sweep_loops_act(const real *restrict J, const real *restrict tau, real *restrict e);
-int mstmm_sweep_loops_settle(const real *restrict L, const real *restrict floor_,
+int mstmm_sweep_loops_apply_effort(const real *restrict J, const real *restrict tau,
+    real *restrict e);
+int mstmm_sweep_loops_pivot_inverse(const real *restrict L, const real *restrict floor_,
     real *restrict inverse);
-int mstmm_sweep_loops_close(const real *restrict inverse, const real *restrict K,
+int mstmm_sweep_loops_eliminate_row(const real *restrict inverse, const real *restrict K,
     const real *restrict l, real *restrict S, real *restrict e);
-int mstmm_sweep_loops_shed(const real *restrict inverse, const real *restrict K,
+int mstmm_sweep_loops_update_column(const real *restrict inverse, const real *restrict K,
     const real *restrict L_p, real *restrict K_p);
-int mstmm_sweep_loops_shed_known(const real *restrict inverse, const real *restrict l,
+int mstmm_sweep_loops_update_known_part(const real *restrict inverse, const real *restrict l,
     const real *restrict L_p, real *restrict l_p);
-int mstmm_sweep_loops_shed_pair(const real *restrict inverse, const real *restrict L_p,
+int mstmm_sweep_loops_update_coupling(const real *restrict inverse, const real *restrict L_p,
     const real *restrict L_q, real *restrict L_pq);
 int mstmm_sweep_loops_multiplier(const real *restrict inverse, const real *restrict l,
     real *restrict x);
-int mstmm_sweep_loops_multiplier_more(const real *restrict inverse, const real *restrict K,
+int mstmm_sweep_loops_multiplier_of_motion(const real *restrict inverse, const real *restrict K,
     const real *restrict delta, real *restrict x);
-int mstmm_sweep_loops_multiplier_less(const real *restrict inverse, const real *restrict L_p,
+int mstmm_sweep_loops_multiplier_of_row(const real *restrict inverse, const real *restrict L_p,
     const real *restrict x_p, real *restrict x);
-int mstmm_sweep_loops_yielded(const real *restrict softness, const real *restrict s,
+int mstmm_sweep_loops_rotor_row_residual(const real *restrict softness, const real *restrict s,
     const real *restrict x, real *restrict l);
-int mstmm_sweep_loops_loaded(const real *restrict K, const real *restrict x, real *restrict e);
+int mstmm_sweep_loops_apply_multiplier(const real *restrict K, const real *restrict x,
+    real *restrict e);
 int mstmm_sweep_loops_distance(const real *restrict p, const real *restrict d, real *restrict W,
     real *restrict gap);
 int mstmm_sweep_loops_distance_drift(const real *restrict d, const real *restrict slip,
@@ -59,7 +62,7 @@ int mstmm_sweep_loops_rolling(const real *restrict p, const real *restrict R_C,
     const real *restrict d, real *restrict W, real *restrict gap);
 int mstmm_sweep_loops_rolling_drift(const real *restrict p, const real *restrict R_C,
     const real *restrict slip, real *restrict drift);
-int mstmm_sweep_loops_meet_slope(const real *restrict A_C, const real *restrict x_C,
+int mstmm_sweep_loops_relative_pose_slope(const real *restrict A_C, const real *restrict x_C,
     const real *restrict A_B, const real *restrict x_B, const real *restrict r_e,
     const real *restrict Rc, const real *restrict r, const real *restrict d_A_C,
     const real *restrict d_x_C, const real *restrict d_A_B, const real *restrict d_x_B,
@@ -79,11 +82,11 @@ int mstmm_sweep_loops_row_slope(const real *restrict w, const real *restrict R_C
     const real *restrict r_e, const real *restrict Rc, const real *restrict r_A,
     const real *restrict d_w, const real *restrict d_R_C, const real *restrict d_Rc,
     const real *restrict d_r_A, real *restrict d_J_A, real *restrict d_J_B);
-int mstmm_sweep_loops_known_slope(const real *restrict W, const real *restrict relative,
+int mstmm_sweep_loops_known_parts_slope(const real *restrict W, const real *restrict relative,
     const real *restrict d_W, const real *restrict d_relative, real *restrict d_l);
-int mstmm_sweep_loops_act_slope(const real *restrict J, const real *restrict tau,
+int mstmm_sweep_loops_apply_effort_slope(const real *restrict J, const real *restrict tau,
     const real *restrict d_J, const real *restrict d_tau, real *restrict d_e);
-int mstmm_sweep_loops_loaded_slope(const real *restrict K, const real *restrict x,
+int mstmm_sweep_loops_apply_multiplier_slope(const real *restrict K, const real *restrict x,
     const real *restrict d_K, const real *restrict d_x, real *restrict d_e);
 int mstmm_sweep_loops_distance_slope(const real *restrict p, const real *restrict d,
     const real *restrict d_d, real *restrict d_W);
@@ -112,7 +115,7 @@ int mstmm_sweep_loops_rolling_drift_slope(const real *restrict p, const real *re
  * out r_A[3] (m) the end of B from P of A, axes of A
  * out d[3] (m) that end from the origin of C, axes of C
  */
-int mstmm_sweep_loops_meet(const real *restrict A_C, const real *restrict x_C,
+int mstmm_sweep_loops_relative_pose(const real *restrict A_C, const real *restrict x_C,
     const real *restrict A_B, const real *restrict x_B, const real *restrict r_e,
     const real *restrict Rc, const real *restrict r, real *restrict R_C, real *restrict r_A,
     real *restrict d)
@@ -234,13 +237,13 @@ int mstmm_sweep_loops_meet(const real *restrict A_C, const real *restrict x_C,
     return 0;
 }
 
-static int mstmm_sweep_loops_meet_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_loops_relative_pose_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_loops_meet(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2]);
+    return mstmm_sweep_loops_relative_pose(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2]);
 }
 
-static const mstmm_port mstmm_sweep_loops_meet_inputs[] = {
+static const mstmm_port mstmm_sweep_loops_relative_pose_inputs[] = {
     {"A_C", 9, "", 0, 0},
     {"x_C", 3, "m", 0, 0},
     {"A_B", 9, "", 0, 0},
@@ -250,7 +253,7 @@ static const mstmm_port mstmm_sweep_loops_meet_inputs[] = {
     {"r", 3, "m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_loops_meet_outputs[] = {
+static const mstmm_port mstmm_sweep_loops_relative_pose_outputs[] = {
     {"R_C", 9, "", 0, 0},
     {"r_A", 3, "m", 0, 0},
     {"d", 3, "m", 0, 0},
@@ -648,7 +651,7 @@ static const mstmm_port mstmm_sweep_loops_drift_outputs[] = {
  * in  rate[1] (1/s^2) accelerations by changes of coordinates
  * out relative[6] motion of the end of B relative to C
  */
-int mstmm_sweep_loops_closing(const real *restrict gap, const real *restrict rate,
+int mstmm_sweep_loops_required_acceleration(const real *restrict gap, const real *restrict rate,
     real *restrict relative)
 {
     const real t0 = gap[0] * rate[0];
@@ -666,18 +669,18 @@ int mstmm_sweep_loops_closing(const real *restrict gap, const real *restrict rat
     return 0;
 }
 
-static int mstmm_sweep_loops_closing_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_loops_required_acceleration_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_loops_closing(in[0], in[1], out[0]);
+    return mstmm_sweep_loops_required_acceleration(in[0], in[1], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_loops_closing_inputs[] = {
+static const mstmm_port mstmm_sweep_loops_required_acceleration_inputs[] = {
     {"gap", 6, "", 0, 0},
     {"rate", 1, "1/s^2", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_loops_closing_outputs[] = {
+static const mstmm_port mstmm_sweep_loops_required_acceleration_outputs[] = {
     {"relative", 6, "", 0, 0},
 };
 
@@ -824,7 +827,8 @@ static const mstmm_port mstmm_sweep_loops_row_outputs[] = {
  * in  relative[6] motion of the end of B relative to C
  * out l[6] known parts of the rows
  */
-int mstmm_sweep_loops_known(const real *restrict W, const real *restrict relative, real *restrict l)
+int mstmm_sweep_loops_known_parts(const real *restrict W, const real *restrict relative,
+    real *restrict l)
 {
     const real t0 = W[0] * relative[0];
     const real t1 = W[1] * relative[1];
@@ -901,18 +905,18 @@ int mstmm_sweep_loops_known(const real *restrict W, const real *restrict relativ
     return 0;
 }
 
-static int mstmm_sweep_loops_known_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_loops_known_parts_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_loops_known(in[0], in[1], out[0]);
+    return mstmm_sweep_loops_known_parts(in[0], in[1], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_loops_known_inputs[] = {
+static const mstmm_port mstmm_sweep_loops_known_parts_inputs[] = {
     {"W", 36, "", 0, 0},
     {"relative", 6, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_loops_known_outputs[] = {
+static const mstmm_port mstmm_sweep_loops_known_parts_outputs[] = {
     {"l", 6, "", 0, 0},
 };
 
@@ -926,7 +930,7 @@ static const mstmm_port mstmm_sweep_loops_known_outputs[] = {
  * in  delta_B[6] deviation of the acceleration of B
  * out c[1] acceleration along the direction
  */
-int mstmm_sweep_loops_told(const real *restrict J_A, const real *restrict J_B,
+int mstmm_sweep_loops_row_acceleration(const real *restrict J_A, const real *restrict J_B,
     const real *restrict l, const real *restrict delta_A, const real *restrict delta_B,
     real *restrict c)
 {
@@ -958,13 +962,13 @@ int mstmm_sweep_loops_told(const real *restrict J_A, const real *restrict J_B,
     return 0;
 }
 
-static int mstmm_sweep_loops_told_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_loops_row_acceleration_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_loops_told(in[0], in[1], in[2], in[3], in[4], out[0]);
+    return mstmm_sweep_loops_row_acceleration(in[0], in[1], in[2], in[3], in[4], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_loops_told_inputs[] = {
+static const mstmm_port mstmm_sweep_loops_row_acceleration_inputs[] = {
     {"J_A", 6, "", 0, 0},
     {"J_B", 6, "", 0, 0},
     {"l", 1, "", 0, 0},
@@ -972,7 +976,7 @@ static const mstmm_port mstmm_sweep_loops_told_inputs[] = {
     {"delta_B", 6, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_loops_told_outputs[] = {
+static const mstmm_port mstmm_sweep_loops_row_acceleration_outputs[] = {
     {"c", 1, "", 0, 0},
 };
 
@@ -983,7 +987,8 @@ static const mstmm_port mstmm_sweep_loops_told_outputs[] = {
  * in  tau[1] (N, N*m) effort
  * out e[6] (N, N*m) force part of f = S a + e, added to what is there
  */
-int mstmm_sweep_loops_act(const real *restrict J, const real *restrict tau, real *restrict e)
+int mstmm_sweep_loops_apply_effort(const real *restrict J, const real *restrict tau,
+    real *restrict e)
 {
     const real t0 = J[0] * tau[0];
     const real t1 = -t0;
@@ -1006,18 +1011,18 @@ int mstmm_sweep_loops_act(const real *restrict J, const real *restrict tau, real
     return 0;
 }
 
-static int mstmm_sweep_loops_act_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_loops_apply_effort_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_loops_act(in[0], in[1], out[0]);
+    return mstmm_sweep_loops_apply_effort(in[0], in[1], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_loops_act_inputs[] = {
+static const mstmm_port mstmm_sweep_loops_apply_effort_inputs[] = {
     {"J", 6, "", 0, 0},
     {"tau", 1, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_loops_act_outputs[] = {
+static const mstmm_port mstmm_sweep_loops_apply_effort_outputs[] = {
     {"e", 6, "N, N*m", 1, 0},
 };
 
@@ -1028,7 +1033,7 @@ static const mstmm_port mstmm_sweep_loops_act_outputs[] = {
  * in  floor[1] largest pivot that is rounding
  * out inverse[1] 1 / L_rr, zero where no motion affects the row
  */
-int mstmm_sweep_loops_settle(const real *restrict L, const real *restrict floor_,
+int mstmm_sweep_loops_pivot_inverse(const real *restrict L, const real *restrict floor_,
     real *restrict inverse)
 {
     const real t0 = floor_[0] < L[0];
@@ -1038,18 +1043,18 @@ int mstmm_sweep_loops_settle(const real *restrict L, const real *restrict floor_
     return 0;
 }
 
-static int mstmm_sweep_loops_settle_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_loops_pivot_inverse_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_loops_settle(in[0], in[1], out[0]);
+    return mstmm_sweep_loops_pivot_inverse(in[0], in[1], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_loops_settle_inputs[] = {
+static const mstmm_port mstmm_sweep_loops_pivot_inverse_inputs[] = {
     {"L", 1, "", 0, 0},
     {"floor", 1, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_loops_settle_outputs[] = {
+static const mstmm_port mstmm_sweep_loops_pivot_inverse_outputs[] = {
     {"inverse", 1, "", 0, 0},
 };
 
@@ -1062,7 +1067,7 @@ static const mstmm_port mstmm_sweep_loops_settle_outputs[] = {
  * out S[21] S of the body, added to what is there
  * out e[6] e of the body, added to what is there
  */
-int mstmm_sweep_loops_close(const real *restrict inverse, const real *restrict K,
+int mstmm_sweep_loops_eliminate_row(const real *restrict inverse, const real *restrict K,
     const real *restrict l, real *restrict S, real *restrict e)
 {
     const real t0 = inverse[0] * K[0];
@@ -1128,19 +1133,19 @@ int mstmm_sweep_loops_close(const real *restrict inverse, const real *restrict K
     return 0;
 }
 
-static int mstmm_sweep_loops_close_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_loops_eliminate_row_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_loops_close(in[0], in[1], in[2], out[0], out[1]);
+    return mstmm_sweep_loops_eliminate_row(in[0], in[1], in[2], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_loops_close_inputs[] = {
+static const mstmm_port mstmm_sweep_loops_eliminate_row_inputs[] = {
     {"inverse", 1, "", 0, 0},
     {"K", 6, "", 0, 0},
     {"l", 1, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_loops_close_outputs[] = {
+static const mstmm_port mstmm_sweep_loops_eliminate_row_outputs[] = {
     {"S", 21, "", 1, 0},
     {"e", 6, "", 1, 0},
 };
@@ -1153,7 +1158,7 @@ static const mstmm_port mstmm_sweep_loops_close_outputs[] = {
  * in  L_p[1] entry of L of the eliminated row and another
  * out K_p[6] column of row p, added to what is there
  */
-int mstmm_sweep_loops_shed(const real *restrict inverse, const real *restrict K,
+int mstmm_sweep_loops_update_column(const real *restrict inverse, const real *restrict K,
     const real *restrict L_p, real *restrict K_p)
 {
     const real t0 = K[0] * L_p[0];
@@ -1183,19 +1188,19 @@ int mstmm_sweep_loops_shed(const real *restrict inverse, const real *restrict K,
     return 0;
 }
 
-static int mstmm_sweep_loops_shed_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_loops_update_column_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_loops_shed(in[0], in[1], in[2], out[0]);
+    return mstmm_sweep_loops_update_column(in[0], in[1], in[2], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_loops_shed_inputs[] = {
+static const mstmm_port mstmm_sweep_loops_update_column_inputs[] = {
     {"inverse", 1, "", 0, 0},
     {"K", 6, "", 0, 0},
     {"L_p", 1, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_loops_shed_outputs[] = {
+static const mstmm_port mstmm_sweep_loops_update_column_outputs[] = {
     {"K_p", 6, "", 1, 0},
 };
 
@@ -1207,7 +1212,7 @@ static const mstmm_port mstmm_sweep_loops_shed_outputs[] = {
  * in  L_p[1] entry of L of the eliminated row and another
  * out l_p[1] known part of row p, added to what is there
  */
-int mstmm_sweep_loops_shed_known(const real *restrict inverse, const real *restrict l,
+int mstmm_sweep_loops_update_known_part(const real *restrict inverse, const real *restrict l,
     const real *restrict L_p, real *restrict l_p)
 {
     const real t0 = inverse[0] * L_p[0];
@@ -1217,19 +1222,19 @@ int mstmm_sweep_loops_shed_known(const real *restrict inverse, const real *restr
     return 0;
 }
 
-static int mstmm_sweep_loops_shed_known_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_loops_update_known_part_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_loops_shed_known(in[0], in[1], in[2], out[0]);
+    return mstmm_sweep_loops_update_known_part(in[0], in[1], in[2], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_loops_shed_known_inputs[] = {
+static const mstmm_port mstmm_sweep_loops_update_known_part_inputs[] = {
     {"inverse", 1, "", 0, 0},
     {"l", 1, "", 0, 0},
     {"L_p", 1, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_loops_shed_known_outputs[] = {
+static const mstmm_port mstmm_sweep_loops_update_known_part_outputs[] = {
     {"l_p", 1, "", 1, 0},
 };
 
@@ -1241,7 +1246,7 @@ static const mstmm_port mstmm_sweep_loops_shed_known_outputs[] = {
  * in  L_q[1] entry of L of the eliminated row and the second
  * out L_pq[1] entry of L of both, added to what is there
  */
-int mstmm_sweep_loops_shed_pair(const real *restrict inverse, const real *restrict L_p,
+int mstmm_sweep_loops_update_coupling(const real *restrict inverse, const real *restrict L_p,
     const real *restrict L_q, real *restrict L_pq)
 {
     const real t0 = L_p[0] * L_q[0];
@@ -1251,19 +1256,19 @@ int mstmm_sweep_loops_shed_pair(const real *restrict inverse, const real *restri
     return 0;
 }
 
-static int mstmm_sweep_loops_shed_pair_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_loops_update_coupling_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_loops_shed_pair(in[0], in[1], in[2], out[0]);
+    return mstmm_sweep_loops_update_coupling(in[0], in[1], in[2], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_loops_shed_pair_inputs[] = {
+static const mstmm_port mstmm_sweep_loops_update_coupling_inputs[] = {
     {"inverse", 1, "", 0, 0},
     {"L_p", 1, "", 0, 0},
     {"L_q", 1, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_loops_shed_pair_outputs[] = {
+static const mstmm_port mstmm_sweep_loops_update_coupling_outputs[] = {
     {"L_pq", 1, "", 1, 0},
 };
 
@@ -1305,7 +1310,7 @@ static const mstmm_port mstmm_sweep_loops_multiplier_outputs[] = {
  * in  delta[6] deviation of the acceleration of the body
  * out x[1] multiplier of row r, added to what is there
  */
-int mstmm_sweep_loops_multiplier_more(const real *restrict inverse, const real *restrict K,
+int mstmm_sweep_loops_multiplier_of_motion(const real *restrict inverse, const real *restrict K,
     const real *restrict delta, real *restrict x)
 {
     const real t0 = inverse[0] * K[0];
@@ -1329,19 +1334,19 @@ int mstmm_sweep_loops_multiplier_more(const real *restrict inverse, const real *
     return 0;
 }
 
-static int mstmm_sweep_loops_multiplier_more_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_loops_multiplier_of_motion_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_loops_multiplier_more(in[0], in[1], in[2], out[0]);
+    return mstmm_sweep_loops_multiplier_of_motion(in[0], in[1], in[2], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_loops_multiplier_more_inputs[] = {
+static const mstmm_port mstmm_sweep_loops_multiplier_of_motion_inputs[] = {
     {"inverse", 1, "", 0, 0},
     {"K", 6, "", 0, 0},
     {"delta", 6, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_loops_multiplier_more_outputs[] = {
+static const mstmm_port mstmm_sweep_loops_multiplier_of_motion_outputs[] = {
     {"x", 1, "", 1, 0},
 };
 
@@ -1353,7 +1358,7 @@ static const mstmm_port mstmm_sweep_loops_multiplier_more_outputs[] = {
  * in  x_p[1] (N, N*m) multiplier of row p
  * out x[1] multiplier of row r, added to what is there
  */
-int mstmm_sweep_loops_multiplier_less(const real *restrict inverse, const real *restrict L_p,
+int mstmm_sweep_loops_multiplier_of_row(const real *restrict inverse, const real *restrict L_p,
     const real *restrict x_p, real *restrict x)
 {
     const real t0 = inverse[0] * L_p[0];
@@ -1363,19 +1368,19 @@ int mstmm_sweep_loops_multiplier_less(const real *restrict inverse, const real *
     return 0;
 }
 
-static int mstmm_sweep_loops_multiplier_less_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_loops_multiplier_of_row_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_loops_multiplier_less(in[0], in[1], in[2], out[0]);
+    return mstmm_sweep_loops_multiplier_of_row(in[0], in[1], in[2], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_loops_multiplier_less_inputs[] = {
+static const mstmm_port mstmm_sweep_loops_multiplier_of_row_inputs[] = {
     {"inverse", 1, "", 0, 0},
     {"L_p", 1, "", 0, 0},
     {"x_p", 1, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_loops_multiplier_less_outputs[] = {
+static const mstmm_port mstmm_sweep_loops_multiplier_of_row_outputs[] = {
     {"x", 1, "", 1, 0},
 };
 
@@ -1387,7 +1392,7 @@ static const mstmm_port mstmm_sweep_loops_multiplier_less_outputs[] = {
  * in  x[1] (N, N*m) multiplier
  * out l[1] known part of the row, added to what is there
  */
-int mstmm_sweep_loops_yielded(const real *restrict softness, const real *restrict s,
+int mstmm_sweep_loops_rotor_row_residual(const real *restrict softness, const real *restrict s,
     const real *restrict x, real *restrict l)
 {
     const real t0 = softness[0] * x[0];
@@ -1396,19 +1401,19 @@ int mstmm_sweep_loops_yielded(const real *restrict softness, const real *restric
     return 0;
 }
 
-static int mstmm_sweep_loops_yielded_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_loops_rotor_row_residual_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_loops_yielded(in[0], in[1], in[2], out[0]);
+    return mstmm_sweep_loops_rotor_row_residual(in[0], in[1], in[2], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_loops_yielded_inputs[] = {
+static const mstmm_port mstmm_sweep_loops_rotor_row_residual_inputs[] = {
     {"softness", 1, "", 0, 0},
     {"s", 1, "", 0, 0},
     {"x", 1, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_loops_yielded_outputs[] = {
+static const mstmm_port mstmm_sweep_loops_rotor_row_residual_outputs[] = {
     {"l", 1, "", 1, 0},
 };
 
@@ -1419,7 +1424,8 @@ static const mstmm_port mstmm_sweep_loops_yielded_outputs[] = {
  * in  x[1] (N, N*m) multiplier
  * out e[6] e of the body, added to what is there
  */
-int mstmm_sweep_loops_loaded(const real *restrict K, const real *restrict x, real *restrict e)
+int mstmm_sweep_loops_apply_multiplier(const real *restrict K, const real *restrict x,
+    real *restrict e)
 {
     const real t0 = K[0] * x[0];
     e[0] += t0;
@@ -1436,18 +1442,18 @@ int mstmm_sweep_loops_loaded(const real *restrict K, const real *restrict x, rea
     return 0;
 }
 
-static int mstmm_sweep_loops_loaded_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_loops_apply_multiplier_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_loops_loaded(in[0], in[1], out[0]);
+    return mstmm_sweep_loops_apply_multiplier(in[0], in[1], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_loops_loaded_inputs[] = {
+static const mstmm_port mstmm_sweep_loops_apply_multiplier_inputs[] = {
     {"K", 6, "", 0, 0},
     {"x", 1, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_loops_loaded_outputs[] = {
+static const mstmm_port mstmm_sweep_loops_apply_multiplier_outputs[] = {
     {"e", 6, "", 1, 0},
 };
 
@@ -1901,7 +1907,7 @@ static const mstmm_port mstmm_sweep_loops_rolling_drift_outputs[] = {
     {"drift", 6, "", 1, 0},
 };
 
-/* meet and its derivative along a direction
+/* relative_pose and its derivative along a direction
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  A_C[3][3] rotation, axes of C to inertial axes
@@ -1921,7 +1927,7 @@ static const mstmm_port mstmm_sweep_loops_rolling_drift_outputs[] = {
  * out d_r_A[3] (m) derivative of r_A
  * out d_d[3] (m) derivative of d
  */
-int mstmm_sweep_loops_meet_slope(const real *restrict A_C, const real *restrict x_C,
+int mstmm_sweep_loops_relative_pose_slope(const real *restrict A_C, const real *restrict x_C,
     const real *restrict A_B, const real *restrict x_B, const real *restrict r_e,
     const real *restrict Rc, const real *restrict r, const real *restrict d_A_C,
     const real *restrict d_x_C, const real *restrict d_A_B, const real *restrict d_x_B,
@@ -2172,13 +2178,13 @@ int mstmm_sweep_loops_meet_slope(const real *restrict A_C, const real *restrict 
     return 0;
 }
 
-static int mstmm_sweep_loops_meet_slope_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_loops_relative_pose_slope_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_loops_meet_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], out[0], out[1], out[2]);
+    return mstmm_sweep_loops_relative_pose_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], out[0], out[1], out[2]);
 }
 
-static const mstmm_port mstmm_sweep_loops_meet_slope_inputs[] = {
+static const mstmm_port mstmm_sweep_loops_relative_pose_slope_inputs[] = {
     {"A_C", 9, "", 0, 0},
     {"x_C", 3, "m", 0, 0},
     {"A_B", 9, "", 0, 0},
@@ -2194,7 +2200,7 @@ static const mstmm_port mstmm_sweep_loops_meet_slope_inputs[] = {
     {"d_r", 3, "m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_loops_meet_slope_outputs[] = {
+static const mstmm_port mstmm_sweep_loops_relative_pose_slope_outputs[] = {
     {"d_R_C", 9, "", 0, 0},
     {"d_r_A", 3, "m", 0, 0},
     {"d_d", 3, "m", 0, 0},
@@ -2979,7 +2985,7 @@ static const mstmm_port mstmm_sweep_loops_row_slope_outputs[] = {
     {"d_J_B", 6, "", 0, 0},
 };
 
-/* known and its derivative along a direction
+/* known_parts and its derivative along a direction
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  W[6][6] rows: H^+, then the constrained directions
@@ -2988,7 +2994,7 @@ static const mstmm_port mstmm_sweep_loops_row_slope_outputs[] = {
  * in  d_relative[6] derivative of relative
  * out d_l[6] derivative of l
  */
-int mstmm_sweep_loops_known_slope(const real *restrict W, const real *restrict relative,
+int mstmm_sweep_loops_known_parts_slope(const real *restrict W, const real *restrict relative,
     const real *restrict d_W, const real *restrict d_relative, real *restrict d_l)
 {
     const real t0 = relative[5] * d_W[5];
@@ -3138,24 +3144,24 @@ int mstmm_sweep_loops_known_slope(const real *restrict W, const real *restrict r
     return 0;
 }
 
-static int mstmm_sweep_loops_known_slope_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_loops_known_parts_slope_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_loops_known_slope(in[0], in[1], in[2], in[3], out[0]);
+    return mstmm_sweep_loops_known_parts_slope(in[0], in[1], in[2], in[3], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_loops_known_slope_inputs[] = {
+static const mstmm_port mstmm_sweep_loops_known_parts_slope_inputs[] = {
     {"W", 36, "", 0, 0},
     {"relative", 6, "", 0, 0},
     {"d_W", 36, "", 0, 0},
     {"d_relative", 6, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_loops_known_slope_outputs[] = {
+static const mstmm_port mstmm_sweep_loops_known_parts_slope_outputs[] = {
     {"d_l", 6, "", 0, 0},
 };
 
-/* act and its derivative along a direction
+/* apply_effort and its derivative along a direction
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  J[6] load of a unit effort
@@ -3164,7 +3170,7 @@ static const mstmm_port mstmm_sweep_loops_known_slope_outputs[] = {
  * in  d_tau[1] (N, N*m) derivative of tau
  * out d_e[6] (N, N*m) derivative of e, added to what is there
  */
-int mstmm_sweep_loops_act_slope(const real *restrict J, const real *restrict tau,
+int mstmm_sweep_loops_apply_effort_slope(const real *restrict J, const real *restrict tau,
     const real *restrict d_J, const real *restrict d_tau, real *restrict d_e)
 {
     const real t0 = tau[0] * d_J[0];
@@ -3200,24 +3206,24 @@ int mstmm_sweep_loops_act_slope(const real *restrict J, const real *restrict tau
     return 0;
 }
 
-static int mstmm_sweep_loops_act_slope_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_loops_apply_effort_slope_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_loops_act_slope(in[0], in[1], in[2], in[3], out[0]);
+    return mstmm_sweep_loops_apply_effort_slope(in[0], in[1], in[2], in[3], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_loops_act_slope_inputs[] = {
+static const mstmm_port mstmm_sweep_loops_apply_effort_slope_inputs[] = {
     {"J", 6, "", 0, 0},
     {"tau", 1, "N, N*m", 0, 0},
     {"d_J", 6, "", 0, 0},
     {"d_tau", 1, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_loops_act_slope_outputs[] = {
+static const mstmm_port mstmm_sweep_loops_apply_effort_slope_outputs[] = {
     {"d_e", 6, "N, N*m", 1, 0},
 };
 
-/* loaded and its derivative along a direction
+/* apply_multiplier and its derivative along a direction
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  K[6] column of the row, at P of its current body
@@ -3226,7 +3232,7 @@ static const mstmm_port mstmm_sweep_loops_act_slope_outputs[] = {
  * in  d_x[1] (N, N*m) derivative of x
  * out d_e[6] derivative of e, added to what is there
  */
-int mstmm_sweep_loops_loaded_slope(const real *restrict K, const real *restrict x,
+int mstmm_sweep_loops_apply_multiplier_slope(const real *restrict K, const real *restrict x,
     const real *restrict d_K, const real *restrict d_x, real *restrict d_e)
 {
     const real t0 = x[0] * d_K[0];
@@ -3256,20 +3262,20 @@ int mstmm_sweep_loops_loaded_slope(const real *restrict K, const real *restrict 
     return 0;
 }
 
-static int mstmm_sweep_loops_loaded_slope_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_loops_apply_multiplier_slope_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_loops_loaded_slope(in[0], in[1], in[2], in[3], out[0]);
+    return mstmm_sweep_loops_apply_multiplier_slope(in[0], in[1], in[2], in[3], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_loops_loaded_slope_inputs[] = {
+static const mstmm_port mstmm_sweep_loops_apply_multiplier_slope_inputs[] = {
     {"K", 6, "", 0, 0},
     {"x", 1, "N, N*m", 0, 0},
     {"d_K", 6, "", 0, 0},
     {"d_x", 1, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_loops_loaded_slope_outputs[] = {
+static const mstmm_port mstmm_sweep_loops_apply_multiplier_slope_outputs[] = {
     {"d_e", 6, "", 1, 0},
 };
 
@@ -3976,14 +3982,14 @@ static const mstmm_port mstmm_sweep_loops_rolling_drift_slope_outputs[] = {
 
 static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
     {
-        .name = "meet",
-        .function = (void (*)(void))mstmm_sweep_loops_meet,
-        .call = mstmm_sweep_loops_meet_call,
+        .name = "relative_pose",
+        .function = (void (*)(void))mstmm_sweep_loops_relative_pose,
+        .call = mstmm_sweep_loops_relative_pose_call,
         .n_inputs = 7,
         .n_outputs = 3,
-        .inputs = mstmm_sweep_loops_meet_inputs,
-        .outputs = mstmm_sweep_loops_meet_outputs,
-        .ir_hash = "ecf048e4c674b98c12e77b83391820dd157c22500f4c3583d794304b2610d14c",
+        .inputs = mstmm_sweep_loops_relative_pose_inputs,
+        .outputs = mstmm_sweep_loops_relative_pose_outputs,
+        .ir_hash = "1e5a2740c1b35eb8cae5372ba5f438f1b6121fddc62bdaffe4d876d774fe1578",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4024,14 +4030,14 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "closing",
-        .function = (void (*)(void))mstmm_sweep_loops_closing,
-        .call = mstmm_sweep_loops_closing_call,
+        .name = "required_acceleration",
+        .function = (void (*)(void))mstmm_sweep_loops_required_acceleration,
+        .call = mstmm_sweep_loops_required_acceleration_call,
         .n_inputs = 2,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_closing_inputs,
-        .outputs = mstmm_sweep_loops_closing_outputs,
-        .ir_hash = "51940bbaec481e2b5eb740e417644ef05d95c5ae837cdfafbcc226563e70e987",
+        .inputs = mstmm_sweep_loops_required_acceleration_inputs,
+        .outputs = mstmm_sweep_loops_required_acceleration_outputs,
+        .ir_hash = "c921834c099ebc988eb3047f1f9acea4f64e1647943e137ac2a6a2b2af6e10c4",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4048,98 +4054,98 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "known",
-        .function = (void (*)(void))mstmm_sweep_loops_known,
-        .call = mstmm_sweep_loops_known_call,
+        .name = "known_parts",
+        .function = (void (*)(void))mstmm_sweep_loops_known_parts,
+        .call = mstmm_sweep_loops_known_parts_call,
         .n_inputs = 2,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_known_inputs,
-        .outputs = mstmm_sweep_loops_known_outputs,
-        .ir_hash = "e6217dcc891ac76b3344e6615a8b65ddc36ae61bf0089232b0512e7d21355802",
+        .inputs = mstmm_sweep_loops_known_parts_inputs,
+        .outputs = mstmm_sweep_loops_known_parts_outputs,
+        .ir_hash = "3d1f0350c6aaa9ba0332fddbc6ac98220c1df53947a724f41819692371885f9c",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "told",
-        .function = (void (*)(void))mstmm_sweep_loops_told,
-        .call = mstmm_sweep_loops_told_call,
+        .name = "row_acceleration",
+        .function = (void (*)(void))mstmm_sweep_loops_row_acceleration,
+        .call = mstmm_sweep_loops_row_acceleration_call,
         .n_inputs = 5,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_told_inputs,
-        .outputs = mstmm_sweep_loops_told_outputs,
-        .ir_hash = "894d6e6028ab405fdb0be0fd3a3fc0654e87d7373a8bc7e48f008557dc388c19",
+        .inputs = mstmm_sweep_loops_row_acceleration_inputs,
+        .outputs = mstmm_sweep_loops_row_acceleration_outputs,
+        .ir_hash = "44376ecadc4e52049941e6d04d67dfed0cf5f33763342a684642348feaa1941a",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "act",
-        .function = (void (*)(void))mstmm_sweep_loops_act,
-        .call = mstmm_sweep_loops_act_call,
+        .name = "apply_effort",
+        .function = (void (*)(void))mstmm_sweep_loops_apply_effort,
+        .call = mstmm_sweep_loops_apply_effort_call,
         .n_inputs = 2,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_act_inputs,
-        .outputs = mstmm_sweep_loops_act_outputs,
-        .ir_hash = "54ce2090edc2f5a199c615263d8f2856e6a715d845072c139411eeab771ccf68",
+        .inputs = mstmm_sweep_loops_apply_effort_inputs,
+        .outputs = mstmm_sweep_loops_apply_effort_outputs,
+        .ir_hash = "4f08ea93df91fd1dbc29675b0205aa587d0fb3590e58d1f6abf81a0fb52feecd",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "settle",
-        .function = (void (*)(void))mstmm_sweep_loops_settle,
-        .call = mstmm_sweep_loops_settle_call,
+        .name = "pivot_inverse",
+        .function = (void (*)(void))mstmm_sweep_loops_pivot_inverse,
+        .call = mstmm_sweep_loops_pivot_inverse_call,
         .n_inputs = 2,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_settle_inputs,
-        .outputs = mstmm_sweep_loops_settle_outputs,
-        .ir_hash = "b0762d5f3cb8e9c7c8a95274a976ecb9bd73a1db422b8ef0a9fd20bbd96007bb",
+        .inputs = mstmm_sweep_loops_pivot_inverse_inputs,
+        .outputs = mstmm_sweep_loops_pivot_inverse_outputs,
+        .ir_hash = "717594a4e2e66ee200cb5d12841fa3ee802b17fa8836d0959fe92f1ff867b51d",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "close",
-        .function = (void (*)(void))mstmm_sweep_loops_close,
-        .call = mstmm_sweep_loops_close_call,
+        .name = "eliminate_row",
+        .function = (void (*)(void))mstmm_sweep_loops_eliminate_row,
+        .call = mstmm_sweep_loops_eliminate_row_call,
         .n_inputs = 3,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_loops_close_inputs,
-        .outputs = mstmm_sweep_loops_close_outputs,
-        .ir_hash = "b52b951a456402113e4ba0ccdfcc9f15dc69afe6c7e628b52743706f8904f51b",
+        .inputs = mstmm_sweep_loops_eliminate_row_inputs,
+        .outputs = mstmm_sweep_loops_eliminate_row_outputs,
+        .ir_hash = "713fbf6e5c610f41335662ebf87c519f69c0bb72906967619b25f8b43e329d40",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "shed",
-        .function = (void (*)(void))mstmm_sweep_loops_shed,
-        .call = mstmm_sweep_loops_shed_call,
+        .name = "update_column",
+        .function = (void (*)(void))mstmm_sweep_loops_update_column,
+        .call = mstmm_sweep_loops_update_column_call,
         .n_inputs = 3,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_shed_inputs,
-        .outputs = mstmm_sweep_loops_shed_outputs,
-        .ir_hash = "51d42872b5bb5a727c0d7de367746caae69db64aab0d7c458e13fa78e38314a1",
+        .inputs = mstmm_sweep_loops_update_column_inputs,
+        .outputs = mstmm_sweep_loops_update_column_outputs,
+        .ir_hash = "7c3d3cf4927fa1fc9d3368f5fee36c375b2d025476a08b41d0b4eaac62f91f8f",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "shed_known",
-        .function = (void (*)(void))mstmm_sweep_loops_shed_known,
-        .call = mstmm_sweep_loops_shed_known_call,
+        .name = "update_known_part",
+        .function = (void (*)(void))mstmm_sweep_loops_update_known_part,
+        .call = mstmm_sweep_loops_update_known_part_call,
         .n_inputs = 3,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_shed_known_inputs,
-        .outputs = mstmm_sweep_loops_shed_known_outputs,
-        .ir_hash = "22b62e27956f3bab723448806180df0b9f5fc524c34598b07d70207d56416242",
+        .inputs = mstmm_sweep_loops_update_known_part_inputs,
+        .outputs = mstmm_sweep_loops_update_known_part_outputs,
+        .ir_hash = "010209841523b2a9a2d7b3b2a6d2637bfacf3c0212ee9c2e27ef5cdf64c5c91c",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "shed_pair",
-        .function = (void (*)(void))mstmm_sweep_loops_shed_pair,
-        .call = mstmm_sweep_loops_shed_pair_call,
+        .name = "update_coupling",
+        .function = (void (*)(void))mstmm_sweep_loops_update_coupling,
+        .call = mstmm_sweep_loops_update_coupling_call,
         .n_inputs = 3,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_shed_pair_inputs,
-        .outputs = mstmm_sweep_loops_shed_pair_outputs,
-        .ir_hash = "9cc0e982b68b2463ec5f0bcab91c4b33e1371f548bc7ea1962218c24ea33355b",
+        .inputs = mstmm_sweep_loops_update_coupling_inputs,
+        .outputs = mstmm_sweep_loops_update_coupling_outputs,
+        .ir_hash = "516245a0d0d47aec76b806ec972ceb7c0be968e00ae4599e88a0d5a9f5837e17",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4156,50 +4162,50 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "multiplier_more",
-        .function = (void (*)(void))mstmm_sweep_loops_multiplier_more,
-        .call = mstmm_sweep_loops_multiplier_more_call,
+        .name = "multiplier_of_motion",
+        .function = (void (*)(void))mstmm_sweep_loops_multiplier_of_motion,
+        .call = mstmm_sweep_loops_multiplier_of_motion_call,
         .n_inputs = 3,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_multiplier_more_inputs,
-        .outputs = mstmm_sweep_loops_multiplier_more_outputs,
-        .ir_hash = "f2abb11dccbd104efac75c868a856d8a2e6ae9c7d71d5829e143070b7b38ea2b",
+        .inputs = mstmm_sweep_loops_multiplier_of_motion_inputs,
+        .outputs = mstmm_sweep_loops_multiplier_of_motion_outputs,
+        .ir_hash = "726dcbc31e9c42b4e558fbfc18b4374e77aceab83307f9a74a36a2f0c9ce68de",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "multiplier_less",
-        .function = (void (*)(void))mstmm_sweep_loops_multiplier_less,
-        .call = mstmm_sweep_loops_multiplier_less_call,
+        .name = "multiplier_of_row",
+        .function = (void (*)(void))mstmm_sweep_loops_multiplier_of_row,
+        .call = mstmm_sweep_loops_multiplier_of_row_call,
         .n_inputs = 3,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_multiplier_less_inputs,
-        .outputs = mstmm_sweep_loops_multiplier_less_outputs,
-        .ir_hash = "0b9dfb83f30d4dbf3becdf109a73e868e7aa941e58a9085ce9b911f6b152b240",
+        .inputs = mstmm_sweep_loops_multiplier_of_row_inputs,
+        .outputs = mstmm_sweep_loops_multiplier_of_row_outputs,
+        .ir_hash = "b721ae78ac5b22a4076fb2ce50db05b316231ee89870e6010bf73940511a2171",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "yielded",
-        .function = (void (*)(void))mstmm_sweep_loops_yielded,
-        .call = mstmm_sweep_loops_yielded_call,
+        .name = "rotor_row_residual",
+        .function = (void (*)(void))mstmm_sweep_loops_rotor_row_residual,
+        .call = mstmm_sweep_loops_rotor_row_residual_call,
         .n_inputs = 3,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_yielded_inputs,
-        .outputs = mstmm_sweep_loops_yielded_outputs,
-        .ir_hash = "5062e0552b6c9f32b29e7bde298472533560d3cefdadfa62ebbd7d39f2c28c31",
+        .inputs = mstmm_sweep_loops_rotor_row_residual_inputs,
+        .outputs = mstmm_sweep_loops_rotor_row_residual_outputs,
+        .ir_hash = "5f3846ce586bc4430169db14015103f5bada445a59e63e72124dbff90305abb7",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "loaded",
-        .function = (void (*)(void))mstmm_sweep_loops_loaded,
-        .call = mstmm_sweep_loops_loaded_call,
+        .name = "apply_multiplier",
+        .function = (void (*)(void))mstmm_sweep_loops_apply_multiplier,
+        .call = mstmm_sweep_loops_apply_multiplier_call,
         .n_inputs = 2,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_loaded_inputs,
-        .outputs = mstmm_sweep_loops_loaded_outputs,
-        .ir_hash = "8155c191d79636521e17ace9af4059cdce9d0f7d18f59e8d66c0eeb79277af4b",
+        .inputs = mstmm_sweep_loops_apply_multiplier_inputs,
+        .outputs = mstmm_sweep_loops_apply_multiplier_outputs,
+        .ir_hash = "251bf35f1a6786f4721b52c6df98b7cefb9b6b55591e1ab514327a16dddc4e91",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4264,14 +4270,14 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "meet_slope",
-        .function = (void (*)(void))mstmm_sweep_loops_meet_slope,
-        .call = mstmm_sweep_loops_meet_slope_call,
+        .name = "relative_pose_slope",
+        .function = (void (*)(void))mstmm_sweep_loops_relative_pose_slope,
+        .call = mstmm_sweep_loops_relative_pose_slope_call,
         .n_inputs = 13,
         .n_outputs = 3,
-        .inputs = mstmm_sweep_loops_meet_slope_inputs,
-        .outputs = mstmm_sweep_loops_meet_slope_outputs,
-        .ir_hash = "d62db560b65d07e6dfe443b070ac01daf1173e2a0bee0341948fb01a1cc02b9d",
+        .inputs = mstmm_sweep_loops_relative_pose_slope_inputs,
+        .outputs = mstmm_sweep_loops_relative_pose_slope_outputs,
+        .ir_hash = "e89830935f6cc37c19c05a3493419af980742994731b41a4c696317e6c10c01d",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4312,38 +4318,38 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "known_slope",
-        .function = (void (*)(void))mstmm_sweep_loops_known_slope,
-        .call = mstmm_sweep_loops_known_slope_call,
+        .name = "known_parts_slope",
+        .function = (void (*)(void))mstmm_sweep_loops_known_parts_slope,
+        .call = mstmm_sweep_loops_known_parts_slope_call,
         .n_inputs = 4,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_known_slope_inputs,
-        .outputs = mstmm_sweep_loops_known_slope_outputs,
-        .ir_hash = "30659e38fa1fcbd9d0f4da7d0195acdda91bfd9da1c4653abc2a89c41695a531",
+        .inputs = mstmm_sweep_loops_known_parts_slope_inputs,
+        .outputs = mstmm_sweep_loops_known_parts_slope_outputs,
+        .ir_hash = "b3896c12504629f639061ba8ac4ae728d23db2e9454b79cbc9e7d46a50206db7",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "act_slope",
-        .function = (void (*)(void))mstmm_sweep_loops_act_slope,
-        .call = mstmm_sweep_loops_act_slope_call,
+        .name = "apply_effort_slope",
+        .function = (void (*)(void))mstmm_sweep_loops_apply_effort_slope,
+        .call = mstmm_sweep_loops_apply_effort_slope_call,
         .n_inputs = 4,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_act_slope_inputs,
-        .outputs = mstmm_sweep_loops_act_slope_outputs,
-        .ir_hash = "0f45bbf49e9ed7887a2483dda9bba13519d1f3346407426edbc7506964c54486",
+        .inputs = mstmm_sweep_loops_apply_effort_slope_inputs,
+        .outputs = mstmm_sweep_loops_apply_effort_slope_outputs,
+        .ir_hash = "7a19c61f2efc0ff45fadd5c3d17887dd04430822661dfa7d717a927bafc1e161",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "loaded_slope",
-        .function = (void (*)(void))mstmm_sweep_loops_loaded_slope,
-        .call = mstmm_sweep_loops_loaded_slope_call,
+        .name = "apply_multiplier_slope",
+        .function = (void (*)(void))mstmm_sweep_loops_apply_multiplier_slope,
+        .call = mstmm_sweep_loops_apply_multiplier_slope_call,
         .n_inputs = 4,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_loaded_slope_inputs,
-        .outputs = mstmm_sweep_loops_loaded_slope_outputs,
-        .ir_hash = "7db1a03ea48e690a9b8f00add16684cfba5e5d3948e8b334f545da9d4730f745",
+        .inputs = mstmm_sweep_loops_apply_multiplier_slope_inputs,
+        .outputs = mstmm_sweep_loops_apply_multiplier_slope_outputs,
+        .ir_hash = "8fc50cecf64101eeca3e17a0aa888a216043cabffd38620b7390e4956d313f2c",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4413,7 +4419,7 @@ const mstmm_element mstmm_sweep_loops = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "loops",
-    .hash = "ad4b802a6473d00ea3e208d78a56a9f8f399ae8e5f34c28cb8cf39e8703f1e3e",
+    .hash = "22fd4ffaf05fb9191475c1e90a12982fa6cb5717394faddbe69217cea57bd762",
     .nq = 0,
     .nu = 0,
     .np = 0,

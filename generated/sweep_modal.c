@@ -34,19 +34,19 @@ int mstmm_sweep_modal_section(int n, const real *restrict r, const real *restric
     const real *restrict h_z, const real *restrict eta, const real *restrict etad,
     real *restrict Phi, real *restrict x, real *restrict Psi, real *restrict xd,
     real *restrict Psid, real *restrict xdd, real *restrict Psidd);
-int mstmm_sweep_modal_outward(const real *restrict R_end, const real *restrict x,
+int mstmm_sweep_modal_end_motion(const real *restrict R_end, const real *restrict x,
     const real *restrict Psi, const real *restrict xd, const real *restrict Psid,
     const real *restrict xdd, const real *restrict Psidd, real *restrict R, real *restrict d,
     real *restrict H6, real *restrict v, real *restrict w, real *restrict c);
-int mstmm_sweep_modal_inward(const real *restrict R_end, const real *restrict x,
+int mstmm_sweep_modal_frame_motion(const real *restrict R_end, const real *restrict x,
     const real *restrict Psi, const real *restrict xd, const real *restrict Psid,
     const real *restrict xdd, const real *restrict Psidd, real *restrict R, real *restrict d,
     real *restrict H6, real *restrict v, real *restrict w, real *restrict c);
 int mstmm_sweep_modal_subspace(int n, const real *restrict H6, const real *restrict Phi,
     real *restrict H);
-int mstmm_sweep_modal_imposed(int n, const real *restrict H, const real *restrict s,
+int mstmm_sweep_modal_prescribed_bias(int n, const real *restrict H, const real *restrict s,
     const real *restrict c, real *restrict c_s);
-int mstmm_sweep_modal_absorb(int n, const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_modal_assemble_port(int n, const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict S, const real *restrict e, real *restrict U,
     real *restrict S_rf, real *restrict S_ff, real *restrict e_f);
 int mstmm_sweep_modal_rebase(int n, const real *restrict H, const real *restrict S,
@@ -58,29 +58,29 @@ int mstmm_sweep_modal_condense(int n, const real *restrict S, const real *restri
     real *restrict work);
 int mstmm_sweep_modal_recover(int n, const real *restrict Gg, const real *restrict delta_I,
     real *restrict etadd);
-int mstmm_sweep_modal_displaced(int n, const real *restrict H, const real *restrict etadd,
+int mstmm_sweep_modal_port_deviation(int n, const real *restrict H, const real *restrict etadd,
     const real *restrict delta_I, real *restrict delta);
-int mstmm_sweep_modal_prescribed(int n, const real *restrict S_rf, const real *restrict S_ff,
+int mstmm_sweep_modal_prescribed_load(int n, const real *restrict S_rf, const real *restrict S_ff,
     const real *restrict s, real *restrict e, real *restrict e_f);
 int mstmm_sweep_modal_modal_effort(int n, const real *restrict H, const real *restrict e,
     const real *restrict e_f, real *restrict tau);
-int mstmm_sweep_modal_pushed(int n, const real *restrict Gg, const real *restrict e,
+int mstmm_sweep_modal_column_load(int n, const real *restrict Gg, const real *restrict e,
     const real *restrict e_f, real *restrict e_c);
-int mstmm_sweep_modal_answer(int n, const real *restrict S_ff, const real *restrict e_f,
-    const real *restrict Gg, const real *restrict delta_I, real *restrict y, real *restrict etadd,
-    real *restrict work);
-int mstmm_sweep_modal_stiffened(int n, const real *restrict K, const real *restrict D,
+int mstmm_sweep_modal_column_acceleration(int n, const real *restrict S_ff,
+    const real *restrict e_f, const real *restrict Gg, const real *restrict delta_I,
+    real *restrict y, real *restrict etadd, real *restrict work);
+int mstmm_sweep_modal_step_stiffness(int n, const real *restrict K, const real *restrict D,
     const real *restrict rate, const real *restrict sq, real *restrict S_ff);
-int mstmm_sweep_modal_strained(int n, const real *restrict K, const real *restrict D,
+int mstmm_sweep_modal_strain_load(int n, const real *restrict K, const real *restrict D,
     const real *restrict eta, const real *restrict etad, real *restrict e_f);
-int mstmm_sweep_modal_row_felt(int n, const real *restrict H, const real *restrict K,
+int mstmm_sweep_modal_modal_column(int n, const real *restrict H, const real *restrict K,
     real *restrict K_f);
-int mstmm_sweep_modal_row_condensed(int n, const real *restrict S_ff, const real *restrict K_f,
+int mstmm_sweep_modal_condense_row(int n, const real *restrict S_ff, const real *restrict K_f,
     const real *restrict Gg, real *restrict Y, real *restrict K, real *restrict l_,
     real *restrict work);
-int mstmm_sweep_modal_row_coupled(int n, const real *restrict K_f, const real *restrict Y,
+int mstmm_sweep_modal_row_coupling(int n, const real *restrict K_f, const real *restrict Y,
     real *restrict L_ij);
-int mstmm_sweep_modal_row_answered(int n, const real *restrict Y, const real *restrict x,
+int mstmm_sweep_modal_multiplier_acceleration(int n, const real *restrict Y, const real *restrict x,
     real *restrict etadd);
 int mstmm_sweep_modal_residual_slope(int n, const real *restrict p, const real *restrict C,
     const real *restrict P, const real *restrict B, const real *restrict Z_xx,
@@ -111,14 +111,14 @@ int mstmm_sweep_modal_section_slope(int n, const real *restrict r, const real *r
     const real *restrict Phi, const real *restrict d_eta, const real *restrict d_etad,
     real *restrict d_Phi, real *restrict d_x, real *restrict d_Psi, real *restrict d_xd,
     real *restrict d_Psid, real *restrict d_xdd, real *restrict d_Psidd);
-int mstmm_sweep_modal_outward_slope(const real *restrict R_end, const real *restrict x,
+int mstmm_sweep_modal_end_motion_slope(const real *restrict R_end, const real *restrict x,
     const real *restrict Psi, const real *restrict xd, const real *restrict Psid,
     const real *restrict xdd, const real *restrict Psidd, const real *restrict d_x,
     const real *restrict d_Psi, const real *restrict d_xd, const real *restrict d_Psid,
     const real *restrict d_xdd, const real *restrict d_Psidd, real *restrict d_R,
     real *restrict d_d, real *restrict d_H6, real *restrict d_v, real *restrict d_w,
     real *restrict d_c);
-int mstmm_sweep_modal_inward_slope(const real *restrict R_end, const real *restrict x,
+int mstmm_sweep_modal_frame_motion_slope(const real *restrict R_end, const real *restrict x,
     const real *restrict Psi, const real *restrict xd, const real *restrict Psid,
     const real *restrict xdd, const real *restrict Psidd, const real *restrict d_x,
     const real *restrict d_Psi, const real *restrict d_xd, const real *restrict d_Psid,
@@ -127,12 +127,12 @@ int mstmm_sweep_modal_inward_slope(const real *restrict R_end, const real *restr
     real *restrict d_c);
 int mstmm_sweep_modal_subspace_slope(int n, const real *restrict H6, const real *restrict Phi,
     const real *restrict d_H6, const real *restrict d_Phi, real *restrict d_H);
-int mstmm_sweep_modal_imposed_slope(int n, const real *restrict H, const real *restrict s,
+int mstmm_sweep_modal_prescribed_bias_slope(int n, const real *restrict H, const real *restrict s,
     const real *restrict c, const real *restrict d_H, const real *restrict d_s,
     const real *restrict d_c, real *restrict d_c_s);
-int mstmm_sweep_modal_prescribed_slope(int n, const real *restrict S_rf, const real *restrict S_ff,
-    const real *restrict s, const real *restrict d_S_rf, const real *restrict d_s,
-    real *restrict d_e, real *restrict d_e_f);
+int mstmm_sweep_modal_prescribed_load_slope(int n, const real *restrict S_rf,
+    const real *restrict S_ff, const real *restrict s, const real *restrict d_S_rf,
+    const real *restrict d_s, real *restrict d_e, real *restrict d_e_f);
 int mstmm_sweep_modal_modal_effort_slope(int n, const real *restrict H, const real *restrict e,
     const real *restrict e_f, const real *restrict d_H, const real *restrict d_e,
     const real *restrict d_e_f, real *restrict d_tau);
@@ -1825,7 +1825,7 @@ static const mstmm_port mstmm_sweep_modal_section_outputs[] = {
  * out w[3] (rad/s) relative angular velocity, outboard axes
  * out c[6] (m/s2, rad/s2) relative acceleration at etadd = 0, outboard axes
  */
-int mstmm_sweep_modal_outward(const real *restrict R_end, const real *restrict x,
+int mstmm_sweep_modal_end_motion(const real *restrict R_end, const real *restrict x,
     const real *restrict Psi, const real *restrict xd, const real *restrict Psid,
     const real *restrict xdd, const real *restrict Psidd, real *restrict R, real *restrict d,
     real *restrict H6, real *restrict v, real *restrict w, real *restrict c)
@@ -2255,13 +2255,13 @@ int mstmm_sweep_modal_outward(const real *restrict R_end, const real *restrict x
     return 0;
 }
 
-static int mstmm_sweep_modal_outward_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_modal_end_motion_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_modal_outward(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5]);
+    return mstmm_sweep_modal_end_motion(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5]);
 }
 
-static const mstmm_port mstmm_sweep_modal_outward_inputs[] = {
+static const mstmm_port mstmm_sweep_modal_end_motion_inputs[] = {
     {"R_end", 9, "", 0, 0},
     {"x", 3, "m", 0, 0},
     {"Psi", 3, "rad", 0, 0},
@@ -2271,7 +2271,7 @@ static const mstmm_port mstmm_sweep_modal_outward_inputs[] = {
     {"Psidd", 3, "rad/s2", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_modal_outward_outputs[] = {
+static const mstmm_port mstmm_sweep_modal_end_motion_outputs[] = {
     {"R", 9, "", 0, 0},
     {"d", 3, "m", 0, 0},
     {"H6", 36, "", 0, 0},
@@ -2280,7 +2280,7 @@ static const mstmm_port mstmm_sweep_modal_outward_outputs[] = {
     {"c", 6, "m/s2, rad/s2", 0, 0},
 };
 
-static const mstmm_guard mstmm_sweep_modal_outward_guards[] = {
+static const mstmm_guard mstmm_sweep_modal_end_motion_guards[] = {
     {1, "a section rotates by more than 3/2 rad relative to its floating frame"},
 };
 
@@ -2302,7 +2302,7 @@ static const mstmm_guard mstmm_sweep_modal_outward_guards[] = {
  * out w[3] (rad/s) relative angular velocity, outboard axes
  * out c[6] (m/s2, rad/s2) relative acceleration at etadd = 0, outboard axes
  */
-int mstmm_sweep_modal_inward(const real *restrict R_end, const real *restrict x,
+int mstmm_sweep_modal_frame_motion(const real *restrict R_end, const real *restrict x,
     const real *restrict Psi, const real *restrict xd, const real *restrict Psid,
     const real *restrict xdd, const real *restrict Psidd, real *restrict R, real *restrict d,
     real *restrict H6, real *restrict v, real *restrict w, real *restrict c)
@@ -2771,13 +2771,13 @@ int mstmm_sweep_modal_inward(const real *restrict R_end, const real *restrict x,
     return 0;
 }
 
-static int mstmm_sweep_modal_inward_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_modal_frame_motion_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_modal_inward(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5]);
+    return mstmm_sweep_modal_frame_motion(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5]);
 }
 
-static const mstmm_port mstmm_sweep_modal_inward_inputs[] = {
+static const mstmm_port mstmm_sweep_modal_frame_motion_inputs[] = {
     {"R_end", 9, "", 0, 0},
     {"x", 3, "m", 0, 0},
     {"Psi", 3, "rad", 0, 0},
@@ -2787,7 +2787,7 @@ static const mstmm_port mstmm_sweep_modal_inward_inputs[] = {
     {"Psidd", 3, "rad/s2", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_modal_inward_outputs[] = {
+static const mstmm_port mstmm_sweep_modal_frame_motion_outputs[] = {
     {"R", 9, "", 0, 0},
     {"d", 3, "m", 0, 0},
     {"H6", 36, "", 0, 0},
@@ -2796,7 +2796,7 @@ static const mstmm_port mstmm_sweep_modal_inward_outputs[] = {
     {"c", 6, "m/s2, rad/s2", 0, 0},
 };
 
-static const mstmm_guard mstmm_sweep_modal_inward_guards[] = {
+static const mstmm_guard mstmm_sweep_modal_frame_motion_guards[] = {
     {1, "a section rotates by more than 3/2 rad relative to its floating frame"},
 };
 
@@ -2935,7 +2935,7 @@ static const mstmm_port mstmm_sweep_modal_subspace_outputs[] = {
  * out c_s[6] relative acceleration
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_modal_imposed_sized(int n, const real *restrict H, const real *restrict s,
+int mstmm_sweep_modal_prescribed_bias_sized(int n, const real *restrict H, const real *restrict s,
     const real *restrict c, real *restrict c_s)
 {
     real t1 = 0;
@@ -2983,30 +2983,30 @@ int mstmm_sweep_modal_imposed_sized(int n, const real *restrict H, const real *r
     return 0;
 }
 
-int mstmm_sweep_modal_imposed(int n, const real *restrict H, const real *restrict s,
+int mstmm_sweep_modal_prescribed_bias(int n, const real *restrict H, const real *restrict s,
     const real *restrict c, real *restrict c_s)
 {
     switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_modal_imposed_sized(1, H, s, c, c_s);
-    case 2: return mstmm_sweep_modal_imposed_sized(2, H, s, c, c_s);
-    case 3: return mstmm_sweep_modal_imposed_sized(3, H, s, c, c_s);
-    case 4: return mstmm_sweep_modal_imposed_sized(4, H, s, c, c_s);
-    default: return mstmm_sweep_modal_imposed_sized(n, H, s, c, c_s);
+    case 1: return mstmm_sweep_modal_prescribed_bias_sized(1, H, s, c, c_s);
+    case 2: return mstmm_sweep_modal_prescribed_bias_sized(2, H, s, c, c_s);
+    case 3: return mstmm_sweep_modal_prescribed_bias_sized(3, H, s, c, c_s);
+    case 4: return mstmm_sweep_modal_prescribed_bias_sized(4, H, s, c, c_s);
+    default: return mstmm_sweep_modal_prescribed_bias_sized(n, H, s, c, c_s);
     }
 }
 
-static int mstmm_sweep_modal_imposed_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_modal_prescribed_bias_call(int n, const real *const *in, real *const *out)
 {
-    return mstmm_sweep_modal_imposed(n, in[0], in[1], in[2], out[0]);
+    return mstmm_sweep_modal_prescribed_bias(n, in[0], in[1], in[2], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_modal_imposed_inputs[] = {
+static const mstmm_port mstmm_sweep_modal_prescribed_bias_inputs[] = {
     {"H", 6, "", 0, 1},
     {"s", 1, "", 0, 1},
     {"c", 6, "m/s2, rad/s2", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_modal_imposed_outputs[] = {
+static const mstmm_port mstmm_sweep_modal_prescribed_bias_outputs[] = {
     {"c_s", 6, "", 0, 0},
 };
 
@@ -3024,7 +3024,7 @@ static const mstmm_port mstmm_sweep_modal_imposed_outputs[] = {
  * out e_f[n] load required by the modes, added to what is there
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_modal_absorb_sized(int n, const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_modal_assemble_port_sized(int n, const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict S, const real *restrict e, real *restrict U,
     real *restrict S_rf, real *restrict S_ff, real *restrict e_f)
 {
@@ -3238,25 +3238,25 @@ int mstmm_sweep_modal_absorb_sized(int n, const real *restrict Rc, const real *r
     return 0;
 }
 
-int mstmm_sweep_modal_absorb(int n, const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_modal_assemble_port(int n, const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict S, const real *restrict e, real *restrict U,
     real *restrict S_rf, real *restrict S_ff, real *restrict e_f)
 {
     switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_modal_absorb_sized(1, Rc, r, H, S, e, U, S_rf, S_ff, e_f);
-    case 2: return mstmm_sweep_modal_absorb_sized(2, Rc, r, H, S, e, U, S_rf, S_ff, e_f);
-    case 3: return mstmm_sweep_modal_absorb_sized(3, Rc, r, H, S, e, U, S_rf, S_ff, e_f);
-    case 4: return mstmm_sweep_modal_absorb_sized(4, Rc, r, H, S, e, U, S_rf, S_ff, e_f);
-    default: return mstmm_sweep_modal_absorb_sized(n, Rc, r, H, S, e, U, S_rf, S_ff, e_f);
+    case 1: return mstmm_sweep_modal_assemble_port_sized(1, Rc, r, H, S, e, U, S_rf, S_ff, e_f);
+    case 2: return mstmm_sweep_modal_assemble_port_sized(2, Rc, r, H, S, e, U, S_rf, S_ff, e_f);
+    case 3: return mstmm_sweep_modal_assemble_port_sized(3, Rc, r, H, S, e, U, S_rf, S_ff, e_f);
+    case 4: return mstmm_sweep_modal_assemble_port_sized(4, Rc, r, H, S, e, U, S_rf, S_ff, e_f);
+    default: return mstmm_sweep_modal_assemble_port_sized(n, Rc, r, H, S, e, U, S_rf, S_ff, e_f);
     }
 }
 
-static int mstmm_sweep_modal_absorb_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_modal_assemble_port_call(int n, const real *const *in, real *const *out)
 {
-    return mstmm_sweep_modal_absorb(n, in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3]);
+    return mstmm_sweep_modal_assemble_port(n, in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3]);
 }
 
-static const mstmm_port mstmm_sweep_modal_absorb_inputs[] = {
+static const mstmm_port mstmm_sweep_modal_assemble_port_inputs[] = {
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"H", 6, "", 0, 1},
@@ -3264,7 +3264,7 @@ static const mstmm_port mstmm_sweep_modal_absorb_inputs[] = {
     {"e", 6, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_modal_absorb_outputs[] = {
+static const mstmm_port mstmm_sweep_modal_assemble_port_outputs[] = {
     {"U", 6, "", 0, 1},
     {"S_rf", 6, "", 1, 1},
     {"S_ff", 1, "", 1, 2},
@@ -3792,8 +3792,8 @@ static const mstmm_port mstmm_sweep_modal_recover_outputs[] = {
  * out delta[6] deviation of the body's acceleration, at P
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_modal_displaced_sized(int n, const real *restrict H, const real *restrict etadd,
-    const real *restrict delta_I, real *restrict delta)
+int mstmm_sweep_modal_port_deviation_sized(int n, const real *restrict H,
+    const real *restrict etadd, const real *restrict delta_I, real *restrict delta)
 {
     real t1 = 0;
     for (int k = 0; k < n; ++k) {
@@ -3840,30 +3840,30 @@ int mstmm_sweep_modal_displaced_sized(int n, const real *restrict H, const real 
     return 0;
 }
 
-int mstmm_sweep_modal_displaced(int n, const real *restrict H, const real *restrict etadd,
+int mstmm_sweep_modal_port_deviation(int n, const real *restrict H, const real *restrict etadd,
     const real *restrict delta_I, real *restrict delta)
 {
     switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_modal_displaced_sized(1, H, etadd, delta_I, delta);
-    case 2: return mstmm_sweep_modal_displaced_sized(2, H, etadd, delta_I, delta);
-    case 3: return mstmm_sweep_modal_displaced_sized(3, H, etadd, delta_I, delta);
-    case 4: return mstmm_sweep_modal_displaced_sized(4, H, etadd, delta_I, delta);
-    default: return mstmm_sweep_modal_displaced_sized(n, H, etadd, delta_I, delta);
+    case 1: return mstmm_sweep_modal_port_deviation_sized(1, H, etadd, delta_I, delta);
+    case 2: return mstmm_sweep_modal_port_deviation_sized(2, H, etadd, delta_I, delta);
+    case 3: return mstmm_sweep_modal_port_deviation_sized(3, H, etadd, delta_I, delta);
+    case 4: return mstmm_sweep_modal_port_deviation_sized(4, H, etadd, delta_I, delta);
+    default: return mstmm_sweep_modal_port_deviation_sized(n, H, etadd, delta_I, delta);
     }
 }
 
-static int mstmm_sweep_modal_displaced_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_modal_port_deviation_call(int n, const real *const *in, real *const *out)
 {
-    return mstmm_sweep_modal_displaced(n, in[0], in[1], in[2], out[0]);
+    return mstmm_sweep_modal_port_deviation(n, in[0], in[1], in[2], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_modal_displaced_inputs[] = {
+static const mstmm_port mstmm_sweep_modal_port_deviation_inputs[] = {
     {"H", 6, "", 0, 1},
     {"etadd", 1, "", 0, 1},
     {"delta_I", 6, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_modal_displaced_outputs[] = {
+static const mstmm_port mstmm_sweep_modal_port_deviation_outputs[] = {
     {"delta", 6, "", 0, 0},
 };
 
@@ -3877,8 +3877,8 @@ static const mstmm_port mstmm_sweep_modal_displaced_outputs[] = {
  * out e_f[n] load required by the modes, added to what is there
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_modal_prescribed_sized(int n, const real *restrict S_rf, const real *restrict S_ff,
-    const real *restrict s, real *restrict e, real *restrict e_f)
+int mstmm_sweep_modal_prescribed_load_sized(int n, const real *restrict S_rf,
+    const real *restrict S_ff, const real *restrict s, real *restrict e, real *restrict e_f)
 {
     for (int k = 0; k < n; ++k) {
         real t1 = 0;
@@ -3927,30 +3927,30 @@ int mstmm_sweep_modal_prescribed_sized(int n, const real *restrict S_rf, const r
     return 0;
 }
 
-int mstmm_sweep_modal_prescribed(int n, const real *restrict S_rf, const real *restrict S_ff,
+int mstmm_sweep_modal_prescribed_load(int n, const real *restrict S_rf, const real *restrict S_ff,
     const real *restrict s, real *restrict e, real *restrict e_f)
 {
     switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_modal_prescribed_sized(1, S_rf, S_ff, s, e, e_f);
-    case 2: return mstmm_sweep_modal_prescribed_sized(2, S_rf, S_ff, s, e, e_f);
-    case 3: return mstmm_sweep_modal_prescribed_sized(3, S_rf, S_ff, s, e, e_f);
-    case 4: return mstmm_sweep_modal_prescribed_sized(4, S_rf, S_ff, s, e, e_f);
-    default: return mstmm_sweep_modal_prescribed_sized(n, S_rf, S_ff, s, e, e_f);
+    case 1: return mstmm_sweep_modal_prescribed_load_sized(1, S_rf, S_ff, s, e, e_f);
+    case 2: return mstmm_sweep_modal_prescribed_load_sized(2, S_rf, S_ff, s, e, e_f);
+    case 3: return mstmm_sweep_modal_prescribed_load_sized(3, S_rf, S_ff, s, e, e_f);
+    case 4: return mstmm_sweep_modal_prescribed_load_sized(4, S_rf, S_ff, s, e, e_f);
+    default: return mstmm_sweep_modal_prescribed_load_sized(n, S_rf, S_ff, s, e, e_f);
     }
 }
 
-static int mstmm_sweep_modal_prescribed_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_modal_prescribed_load_call(int n, const real *const *in, real *const *out)
 {
-    return mstmm_sweep_modal_prescribed(n, in[0], in[1], in[2], out[0], out[1]);
+    return mstmm_sweep_modal_prescribed_load(n, in[0], in[1], in[2], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_modal_prescribed_inputs[] = {
+static const mstmm_port mstmm_sweep_modal_prescribed_load_inputs[] = {
     {"S_rf", 6, "", 0, 1},
     {"S_ff", 1, "", 0, 2},
     {"s", 1, "", 0, 1},
 };
 
-static const mstmm_port mstmm_sweep_modal_prescribed_outputs[] = {
+static const mstmm_port mstmm_sweep_modal_prescribed_load_outputs[] = {
     {"e", 6, "N, N*m", 1, 0},
     {"e_f", 1, "", 1, 1},
 };
@@ -4021,7 +4021,7 @@ static const mstmm_port mstmm_sweep_modal_modal_effort_outputs[] = {
  * out e_c[6] (N, N*m) e without modes
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_modal_pushed_sized(int n, const real *restrict Gg, const real *restrict e,
+int mstmm_sweep_modal_column_load_sized(int n, const real *restrict Gg, const real *restrict e,
     const real *restrict e_f, real *restrict e_c)
 {
     real t1 = 0;
@@ -4069,30 +4069,30 @@ int mstmm_sweep_modal_pushed_sized(int n, const real *restrict Gg, const real *r
     return 0;
 }
 
-int mstmm_sweep_modal_pushed(int n, const real *restrict Gg, const real *restrict e,
+int mstmm_sweep_modal_column_load(int n, const real *restrict Gg, const real *restrict e,
     const real *restrict e_f, real *restrict e_c)
 {
     switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_modal_pushed_sized(1, Gg, e, e_f, e_c);
-    case 2: return mstmm_sweep_modal_pushed_sized(2, Gg, e, e_f, e_c);
-    case 3: return mstmm_sweep_modal_pushed_sized(3, Gg, e, e_f, e_c);
-    case 4: return mstmm_sweep_modal_pushed_sized(4, Gg, e, e_f, e_c);
-    default: return mstmm_sweep_modal_pushed_sized(n, Gg, e, e_f, e_c);
+    case 1: return mstmm_sweep_modal_column_load_sized(1, Gg, e, e_f, e_c);
+    case 2: return mstmm_sweep_modal_column_load_sized(2, Gg, e, e_f, e_c);
+    case 3: return mstmm_sweep_modal_column_load_sized(3, Gg, e, e_f, e_c);
+    case 4: return mstmm_sweep_modal_column_load_sized(4, Gg, e, e_f, e_c);
+    default: return mstmm_sweep_modal_column_load_sized(n, Gg, e, e_f, e_c);
     }
 }
 
-static int mstmm_sweep_modal_pushed_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_modal_column_load_call(int n, const real *const *in, real *const *out)
 {
-    return mstmm_sweep_modal_pushed(n, in[0], in[1], in[2], out[0]);
+    return mstmm_sweep_modal_column_load(n, in[0], in[1], in[2], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_modal_pushed_inputs[] = {
+static const mstmm_port mstmm_sweep_modal_column_load_inputs[] = {
     {"Gg", 7, "", 0, 1},
     {"e", 6, "N, N*m", 0, 0},
     {"e_f", 1, "", 0, 1},
 };
 
-static const mstmm_port mstmm_sweep_modal_pushed_outputs[] = {
+static const mstmm_port mstmm_sweep_modal_column_load_outputs[] = {
     {"e_c", 6, "N, N*m", 0, 0},
 };
 
@@ -4108,9 +4108,9 @@ static const mstmm_port mstmm_sweep_modal_pushed_outputs[] = {
  * out work[n][n] factor L, D of solve
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_modal_answer_sized(int n, const real *restrict S_ff, const real *restrict e_f,
-    const real *restrict Gg, const real *restrict delta_I, real *restrict y, real *restrict etadd,
-    real *restrict work)
+int mstmm_sweep_modal_column_acceleration_sized(int n, const real *restrict S_ff,
+    const real *restrict e_f, const real *restrict Gg, const real *restrict delta_I,
+    real *restrict y, real *restrict etadd, real *restrict work)
 {
     /* a pivot of S_ff vanishes: a motion of the modes is undetermined */
     if (mstmm_solve_ldl(n, 1, S_ff, e_f, y, work, 1e-13)) return 1;
@@ -4133,38 +4133,38 @@ int mstmm_sweep_modal_answer_sized(int n, const real *restrict S_ff, const real 
     return 0;
 }
 
-int mstmm_sweep_modal_answer(int n, const real *restrict S_ff, const real *restrict e_f,
-    const real *restrict Gg, const real *restrict delta_I, real *restrict y, real *restrict etadd,
-    real *restrict work)
+int mstmm_sweep_modal_column_acceleration(int n, const real *restrict S_ff,
+    const real *restrict e_f, const real *restrict Gg, const real *restrict delta_I,
+    real *restrict y, real *restrict etadd, real *restrict work)
 {
     switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_modal_answer_sized(1, S_ff, e_f, Gg, delta_I, y, etadd, work);
-    case 2: return mstmm_sweep_modal_answer_sized(2, S_ff, e_f, Gg, delta_I, y, etadd, work);
-    case 3: return mstmm_sweep_modal_answer_sized(3, S_ff, e_f, Gg, delta_I, y, etadd, work);
-    case 4: return mstmm_sweep_modal_answer_sized(4, S_ff, e_f, Gg, delta_I, y, etadd, work);
-    default: return mstmm_sweep_modal_answer_sized(n, S_ff, e_f, Gg, delta_I, y, etadd, work);
+    case 1: return mstmm_sweep_modal_column_acceleration_sized(1, S_ff, e_f, Gg, delta_I, y, etadd, work);
+    case 2: return mstmm_sweep_modal_column_acceleration_sized(2, S_ff, e_f, Gg, delta_I, y, etadd, work);
+    case 3: return mstmm_sweep_modal_column_acceleration_sized(3, S_ff, e_f, Gg, delta_I, y, etadd, work);
+    case 4: return mstmm_sweep_modal_column_acceleration_sized(4, S_ff, e_f, Gg, delta_I, y, etadd, work);
+    default: return mstmm_sweep_modal_column_acceleration_sized(n, S_ff, e_f, Gg, delta_I, y, etadd, work);
     }
 }
 
-static int mstmm_sweep_modal_answer_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_modal_column_acceleration_call(int n, const real *const *in, real *const *out)
 {
-    return mstmm_sweep_modal_answer(n, in[0], in[1], in[2], in[3], out[0], out[1], out[2]);
+    return mstmm_sweep_modal_column_acceleration(n, in[0], in[1], in[2], in[3], out[0], out[1], out[2]);
 }
 
-static const mstmm_port mstmm_sweep_modal_answer_inputs[] = {
+static const mstmm_port mstmm_sweep_modal_column_acceleration_inputs[] = {
     {"S_ff", 1, "", 0, 2},
     {"e_f", 1, "", 0, 1},
     {"Gg", 7, "", 0, 1},
     {"delta_I", 6, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_modal_answer_outputs[] = {
+static const mstmm_port mstmm_sweep_modal_column_acceleration_outputs[] = {
     {"y", 1, "", 0, 1},
     {"etadd", 1, "", 0, 1},
     {"work", 1, "", 0, 2},
 };
 
-static const mstmm_guard mstmm_sweep_modal_answer_guards[] = {
+static const mstmm_guard mstmm_sweep_modal_column_acceleration_guards[] = {
     {1, "a pivot of S_ff vanishes: a motion of the modes is undetermined"},
 };
 
@@ -4178,7 +4178,7 @@ static const mstmm_guard mstmm_sweep_modal_answer_guards[] = {
  * out S_ff[n][n] rows and columns of the modes, added to what is there
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_modal_stiffened_sized(int n, const real *restrict K, const real *restrict D,
+int mstmm_sweep_modal_step_stiffness_sized(int n, const real *restrict K, const real *restrict D,
     const real *restrict rate, const real *restrict sq, real *restrict S_ff)
 {
     const real t1 = 1.0 / sq[0];
@@ -4193,31 +4193,31 @@ int mstmm_sweep_modal_stiffened_sized(int n, const real *restrict K, const real 
     return 0;
 }
 
-int mstmm_sweep_modal_stiffened(int n, const real *restrict K, const real *restrict D,
+int mstmm_sweep_modal_step_stiffness(int n, const real *restrict K, const real *restrict D,
     const real *restrict rate, const real *restrict sq, real *restrict S_ff)
 {
     switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_modal_stiffened_sized(1, K, D, rate, sq, S_ff);
-    case 2: return mstmm_sweep_modal_stiffened_sized(2, K, D, rate, sq, S_ff);
-    case 3: return mstmm_sweep_modal_stiffened_sized(3, K, D, rate, sq, S_ff);
-    case 4: return mstmm_sweep_modal_stiffened_sized(4, K, D, rate, sq, S_ff);
-    default: return mstmm_sweep_modal_stiffened_sized(n, K, D, rate, sq, S_ff);
+    case 1: return mstmm_sweep_modal_step_stiffness_sized(1, K, D, rate, sq, S_ff);
+    case 2: return mstmm_sweep_modal_step_stiffness_sized(2, K, D, rate, sq, S_ff);
+    case 3: return mstmm_sweep_modal_step_stiffness_sized(3, K, D, rate, sq, S_ff);
+    case 4: return mstmm_sweep_modal_step_stiffness_sized(4, K, D, rate, sq, S_ff);
+    default: return mstmm_sweep_modal_step_stiffness_sized(n, K, D, rate, sq, S_ff);
     }
 }
 
-static int mstmm_sweep_modal_stiffened_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_modal_step_stiffness_call(int n, const real *const *in, real *const *out)
 {
-    return mstmm_sweep_modal_stiffened(n, in[0], in[1], in[2], in[3], out[0]);
+    return mstmm_sweep_modal_step_stiffness(n, in[0], in[1], in[2], in[3], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_modal_stiffened_inputs[] = {
+static const mstmm_port mstmm_sweep_modal_step_stiffness_inputs[] = {
     {"K", 1, "", 0, 2},
     {"D", 1, "", 0, 2},
     {"rate", 1, "s", 0, 0},
     {"sq", 1, "1/s2", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_modal_stiffened_outputs[] = {
+static const mstmm_port mstmm_sweep_modal_step_stiffness_outputs[] = {
     {"S_ff", 1, "", 1, 2},
 };
 
@@ -4231,7 +4231,7 @@ static const mstmm_port mstmm_sweep_modal_stiffened_outputs[] = {
  * out e_f[n] load required by the modes, added to what is there
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_modal_strained_sized(int n, const real *restrict K, const real *restrict D,
+int mstmm_sweep_modal_strain_load_sized(int n, const real *restrict K, const real *restrict D,
     const real *restrict eta, const real *restrict etad, real *restrict e_f)
 {
     for (int k = 0; k < n; ++k) {
@@ -4251,31 +4251,31 @@ int mstmm_sweep_modal_strained_sized(int n, const real *restrict K, const real *
     return 0;
 }
 
-int mstmm_sweep_modal_strained(int n, const real *restrict K, const real *restrict D,
+int mstmm_sweep_modal_strain_load(int n, const real *restrict K, const real *restrict D,
     const real *restrict eta, const real *restrict etad, real *restrict e_f)
 {
     switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_modal_strained_sized(1, K, D, eta, etad, e_f);
-    case 2: return mstmm_sweep_modal_strained_sized(2, K, D, eta, etad, e_f);
-    case 3: return mstmm_sweep_modal_strained_sized(3, K, D, eta, etad, e_f);
-    case 4: return mstmm_sweep_modal_strained_sized(4, K, D, eta, etad, e_f);
-    default: return mstmm_sweep_modal_strained_sized(n, K, D, eta, etad, e_f);
+    case 1: return mstmm_sweep_modal_strain_load_sized(1, K, D, eta, etad, e_f);
+    case 2: return mstmm_sweep_modal_strain_load_sized(2, K, D, eta, etad, e_f);
+    case 3: return mstmm_sweep_modal_strain_load_sized(3, K, D, eta, etad, e_f);
+    case 4: return mstmm_sweep_modal_strain_load_sized(4, K, D, eta, etad, e_f);
+    default: return mstmm_sweep_modal_strain_load_sized(n, K, D, eta, etad, e_f);
     }
 }
 
-static int mstmm_sweep_modal_strained_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_modal_strain_load_call(int n, const real *const *in, real *const *out)
 {
-    return mstmm_sweep_modal_strained(n, in[0], in[1], in[2], in[3], out[0]);
+    return mstmm_sweep_modal_strain_load(n, in[0], in[1], in[2], in[3], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_modal_strained_inputs[] = {
+static const mstmm_port mstmm_sweep_modal_strain_load_inputs[] = {
     {"K", 1, "", 0, 2},
     {"D", 1, "", 0, 2},
     {"eta", 1, "", 0, 1},
     {"etad", 1, "", 0, 1},
 };
 
-static const mstmm_port mstmm_sweep_modal_strained_outputs[] = {
+static const mstmm_port mstmm_sweep_modal_strain_load_outputs[] = {
     {"e_f", 1, "", 1, 1},
 };
 
@@ -4286,7 +4286,7 @@ static const mstmm_port mstmm_sweep_modal_strained_outputs[] = {
  * out K_f[n] column of the row on the modes, added to what is there
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_modal_row_felt_sized(int n, const real *restrict H, const real *restrict K,
+int mstmm_sweep_modal_modal_column_sized(int n, const real *restrict H, const real *restrict K,
     real *restrict K_f)
 {
     for (int k = 0; k < n; ++k) {
@@ -4306,29 +4306,29 @@ int mstmm_sweep_modal_row_felt_sized(int n, const real *restrict H, const real *
     return 0;
 }
 
-int mstmm_sweep_modal_row_felt(int n, const real *restrict H, const real *restrict K,
+int mstmm_sweep_modal_modal_column(int n, const real *restrict H, const real *restrict K,
     real *restrict K_f)
 {
     switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_modal_row_felt_sized(1, H, K, K_f);
-    case 2: return mstmm_sweep_modal_row_felt_sized(2, H, K, K_f);
-    case 3: return mstmm_sweep_modal_row_felt_sized(3, H, K, K_f);
-    case 4: return mstmm_sweep_modal_row_felt_sized(4, H, K, K_f);
-    default: return mstmm_sweep_modal_row_felt_sized(n, H, K, K_f);
+    case 1: return mstmm_sweep_modal_modal_column_sized(1, H, K, K_f);
+    case 2: return mstmm_sweep_modal_modal_column_sized(2, H, K, K_f);
+    case 3: return mstmm_sweep_modal_modal_column_sized(3, H, K, K_f);
+    case 4: return mstmm_sweep_modal_modal_column_sized(4, H, K, K_f);
+    default: return mstmm_sweep_modal_modal_column_sized(n, H, K, K_f);
     }
 }
 
-static int mstmm_sweep_modal_row_felt_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_modal_modal_column_call(int n, const real *const *in, real *const *out)
 {
-    return mstmm_sweep_modal_row_felt(n, in[0], in[1], out[0]);
+    return mstmm_sweep_modal_modal_column(n, in[0], in[1], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_modal_row_felt_inputs[] = {
+static const mstmm_port mstmm_sweep_modal_modal_column_inputs[] = {
     {"H", 6, "", 0, 1},
     {"K", 6, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_modal_row_felt_outputs[] = {
+static const mstmm_port mstmm_sweep_modal_modal_column_outputs[] = {
     {"K_f", 1, "", 1, 1},
 };
 
@@ -4343,9 +4343,9 @@ static const mstmm_port mstmm_sweep_modal_row_felt_outputs[] = {
  * out work[n][n] factor L, D of solve
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_modal_row_condensed_sized(int n, const real *restrict S_ff,
-    const real *restrict K_f, const real *restrict Gg, real *restrict Y, real *restrict K,
-    real *restrict l_, real *restrict work)
+int mstmm_sweep_modal_condense_row_sized(int n, const real *restrict S_ff, const real *restrict K_f,
+    const real *restrict Gg, real *restrict Y, real *restrict K, real *restrict l_,
+    real *restrict work)
 {
     /* a pivot of S_ff vanishes: a motion of the modes is undetermined */
     if (mstmm_solve_ldl(n, 1, S_ff, K_f, Y, work, 1e-13)) return 1;
@@ -4401,38 +4401,38 @@ int mstmm_sweep_modal_row_condensed_sized(int n, const real *restrict S_ff,
     return 0;
 }
 
-int mstmm_sweep_modal_row_condensed(int n, const real *restrict S_ff, const real *restrict K_f,
+int mstmm_sweep_modal_condense_row(int n, const real *restrict S_ff, const real *restrict K_f,
     const real *restrict Gg, real *restrict Y, real *restrict K, real *restrict l_,
     real *restrict work)
 {
     switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_modal_row_condensed_sized(1, S_ff, K_f, Gg, Y, K, l_, work);
-    case 2: return mstmm_sweep_modal_row_condensed_sized(2, S_ff, K_f, Gg, Y, K, l_, work);
-    case 3: return mstmm_sweep_modal_row_condensed_sized(3, S_ff, K_f, Gg, Y, K, l_, work);
-    case 4: return mstmm_sweep_modal_row_condensed_sized(4, S_ff, K_f, Gg, Y, K, l_, work);
-    default: return mstmm_sweep_modal_row_condensed_sized(n, S_ff, K_f, Gg, Y, K, l_, work);
+    case 1: return mstmm_sweep_modal_condense_row_sized(1, S_ff, K_f, Gg, Y, K, l_, work);
+    case 2: return mstmm_sweep_modal_condense_row_sized(2, S_ff, K_f, Gg, Y, K, l_, work);
+    case 3: return mstmm_sweep_modal_condense_row_sized(3, S_ff, K_f, Gg, Y, K, l_, work);
+    case 4: return mstmm_sweep_modal_condense_row_sized(4, S_ff, K_f, Gg, Y, K, l_, work);
+    default: return mstmm_sweep_modal_condense_row_sized(n, S_ff, K_f, Gg, Y, K, l_, work);
     }
 }
 
-static int mstmm_sweep_modal_row_condensed_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_modal_condense_row_call(int n, const real *const *in, real *const *out)
 {
-    return mstmm_sweep_modal_row_condensed(n, in[0], in[1], in[2], out[0], out[1], out[2], out[3]);
+    return mstmm_sweep_modal_condense_row(n, in[0], in[1], in[2], out[0], out[1], out[2], out[3]);
 }
 
-static const mstmm_port mstmm_sweep_modal_row_condensed_inputs[] = {
+static const mstmm_port mstmm_sweep_modal_condense_row_inputs[] = {
     {"S_ff", 1, "", 0, 2},
     {"K_f", 1, "", 0, 1},
     {"Gg", 7, "", 0, 1},
 };
 
-static const mstmm_port mstmm_sweep_modal_row_condensed_outputs[] = {
+static const mstmm_port mstmm_sweep_modal_condense_row_outputs[] = {
     {"Y", 1, "", 0, 1},
     {"K", 6, "", 1, 0},
     {"l", 1, "", 1, 0},
     {"work", 1, "", 0, 2},
 };
 
-static const mstmm_guard mstmm_sweep_modal_row_condensed_guards[] = {
+static const mstmm_guard mstmm_sweep_modal_condense_row_guards[] = {
     {1, "a pivot of S_ff vanishes: a motion of the modes is undetermined"},
 };
 
@@ -4443,7 +4443,7 @@ static const mstmm_guard mstmm_sweep_modal_row_condensed_guards[] = {
  * out L_ij[1] entry of L, added to what is there
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_modal_row_coupled_sized(int n, const real *restrict K_f, const real *restrict Y,
+int mstmm_sweep_modal_row_coupling_sized(int n, const real *restrict K_f, const real *restrict Y,
     real *restrict L_ij)
 {
     real t1 = 0;
@@ -4455,29 +4455,29 @@ int mstmm_sweep_modal_row_coupled_sized(int n, const real *restrict K_f, const r
     return 0;
 }
 
-int mstmm_sweep_modal_row_coupled(int n, const real *restrict K_f, const real *restrict Y,
+int mstmm_sweep_modal_row_coupling(int n, const real *restrict K_f, const real *restrict Y,
     real *restrict L_ij)
 {
     switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_modal_row_coupled_sized(1, K_f, Y, L_ij);
-    case 2: return mstmm_sweep_modal_row_coupled_sized(2, K_f, Y, L_ij);
-    case 3: return mstmm_sweep_modal_row_coupled_sized(3, K_f, Y, L_ij);
-    case 4: return mstmm_sweep_modal_row_coupled_sized(4, K_f, Y, L_ij);
-    default: return mstmm_sweep_modal_row_coupled_sized(n, K_f, Y, L_ij);
+    case 1: return mstmm_sweep_modal_row_coupling_sized(1, K_f, Y, L_ij);
+    case 2: return mstmm_sweep_modal_row_coupling_sized(2, K_f, Y, L_ij);
+    case 3: return mstmm_sweep_modal_row_coupling_sized(3, K_f, Y, L_ij);
+    case 4: return mstmm_sweep_modal_row_coupling_sized(4, K_f, Y, L_ij);
+    default: return mstmm_sweep_modal_row_coupling_sized(n, K_f, Y, L_ij);
     }
 }
 
-static int mstmm_sweep_modal_row_coupled_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_modal_row_coupling_call(int n, const real *const *in, real *const *out)
 {
-    return mstmm_sweep_modal_row_coupled(n, in[0], in[1], out[0]);
+    return mstmm_sweep_modal_row_coupling(n, in[0], in[1], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_modal_row_coupled_inputs[] = {
+static const mstmm_port mstmm_sweep_modal_row_coupling_inputs[] = {
     {"K_f", 1, "", 0, 1},
     {"Y", 1, "", 0, 1},
 };
 
-static const mstmm_port mstmm_sweep_modal_row_coupled_outputs[] = {
+static const mstmm_port mstmm_sweep_modal_row_coupling_outputs[] = {
     {"L_ij", 1, "", 1, 0},
 };
 
@@ -4488,8 +4488,8 @@ static const mstmm_port mstmm_sweep_modal_row_coupled_outputs[] = {
  * out etadd[n] modal accelerations, added to what is there
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_modal_row_answered_sized(int n, const real *restrict Y, const real *restrict x,
-    real *restrict etadd)
+int mstmm_sweep_modal_multiplier_acceleration_sized(int n, const real *restrict Y,
+    const real *restrict x, real *restrict etadd)
 {
     for (int k = 0; k < n; ++k) {
         const real t0 = x[0] * Y[k];
@@ -4499,29 +4499,29 @@ int mstmm_sweep_modal_row_answered_sized(int n, const real *restrict Y, const re
     return 0;
 }
 
-int mstmm_sweep_modal_row_answered(int n, const real *restrict Y, const real *restrict x,
+int mstmm_sweep_modal_multiplier_acceleration(int n, const real *restrict Y, const real *restrict x,
     real *restrict etadd)
 {
     switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_modal_row_answered_sized(1, Y, x, etadd);
-    case 2: return mstmm_sweep_modal_row_answered_sized(2, Y, x, etadd);
-    case 3: return mstmm_sweep_modal_row_answered_sized(3, Y, x, etadd);
-    case 4: return mstmm_sweep_modal_row_answered_sized(4, Y, x, etadd);
-    default: return mstmm_sweep_modal_row_answered_sized(n, Y, x, etadd);
+    case 1: return mstmm_sweep_modal_multiplier_acceleration_sized(1, Y, x, etadd);
+    case 2: return mstmm_sweep_modal_multiplier_acceleration_sized(2, Y, x, etadd);
+    case 3: return mstmm_sweep_modal_multiplier_acceleration_sized(3, Y, x, etadd);
+    case 4: return mstmm_sweep_modal_multiplier_acceleration_sized(4, Y, x, etadd);
+    default: return mstmm_sweep_modal_multiplier_acceleration_sized(n, Y, x, etadd);
     }
 }
 
-static int mstmm_sweep_modal_row_answered_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_modal_multiplier_acceleration_call(int n, const real *const *in, real *const *out)
 {
-    return mstmm_sweep_modal_row_answered(n, in[0], in[1], out[0]);
+    return mstmm_sweep_modal_multiplier_acceleration(n, in[0], in[1], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_modal_row_answered_inputs[] = {
+static const mstmm_port mstmm_sweep_modal_multiplier_acceleration_inputs[] = {
     {"Y", 1, "", 0, 1},
     {"x", 1, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_modal_row_answered_outputs[] = {
+static const mstmm_port mstmm_sweep_modal_multiplier_acceleration_outputs[] = {
     {"etadd", 1, "", 1, 1},
 };
 
@@ -6788,7 +6788,7 @@ static const mstmm_port mstmm_sweep_modal_section_slope_outputs[] = {
     {"d_Psidd", 3, "rad/s2", 0, 0},
 };
 
-/* outward and its derivative along a direction
+/* end_motion and its derivative along a direction
  * source: Shabana, Dynamics of Multibody Systems, ch. 5 (floating frame of reference)
  * source: Schwertassek, Wallrapp, Dynamik flexibler Mehrkoerpersysteme (invariants, unit loads)
  * source: Rui, Wang, Zhang, ch. 8 (rigid-flexible systems)
@@ -6812,7 +6812,7 @@ static const mstmm_port mstmm_sweep_modal_section_slope_outputs[] = {
  * out d_w[3] (rad/s) derivative of w
  * out d_c[6] (m/s2, rad/s2) derivative of c
  */
-int mstmm_sweep_modal_outward_slope(const real *restrict R_end, const real *restrict x,
+int mstmm_sweep_modal_end_motion_slope(const real *restrict R_end, const real *restrict x,
     const real *restrict Psi, const real *restrict xd, const real *restrict Psid,
     const real *restrict xdd, const real *restrict Psidd, const real *restrict d_x,
     const real *restrict d_Psi, const real *restrict d_xd, const real *restrict d_Psid,
@@ -7724,13 +7724,13 @@ int mstmm_sweep_modal_outward_slope(const real *restrict R_end, const real *rest
     return 0;
 }
 
-static int mstmm_sweep_modal_outward_slope_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_modal_end_motion_slope_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_modal_outward_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], out[0], out[1], out[2], out[3], out[4], out[5]);
+    return mstmm_sweep_modal_end_motion_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], out[0], out[1], out[2], out[3], out[4], out[5]);
 }
 
-static const mstmm_port mstmm_sweep_modal_outward_slope_inputs[] = {
+static const mstmm_port mstmm_sweep_modal_end_motion_slope_inputs[] = {
     {"R_end", 9, "", 0, 0},
     {"x", 3, "m", 0, 0},
     {"Psi", 3, "rad", 0, 0},
@@ -7746,7 +7746,7 @@ static const mstmm_port mstmm_sweep_modal_outward_slope_inputs[] = {
     {"d_Psidd", 3, "rad/s2", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_modal_outward_slope_outputs[] = {
+static const mstmm_port mstmm_sweep_modal_end_motion_slope_outputs[] = {
     {"d_R", 9, "", 0, 0},
     {"d_d", 3, "m", 0, 0},
     {"d_H6", 36, "", 0, 0},
@@ -7755,7 +7755,7 @@ static const mstmm_port mstmm_sweep_modal_outward_slope_outputs[] = {
     {"d_c", 6, "m/s2, rad/s2", 0, 0},
 };
 
-/* inward and its derivative along a direction
+/* frame_motion and its derivative along a direction
  * source: Shabana, Dynamics of Multibody Systems, ch. 5 (floating frame of reference)
  * source: Schwertassek, Wallrapp, Dynamik flexibler Mehrkoerpersysteme (invariants, unit loads)
  * source: Rui, Wang, Zhang, ch. 8 (rigid-flexible systems)
@@ -7779,7 +7779,7 @@ static const mstmm_port mstmm_sweep_modal_outward_slope_outputs[] = {
  * out d_w[3] (rad/s) derivative of w
  * out d_c[6] (m/s2, rad/s2) derivative of c
  */
-int mstmm_sweep_modal_inward_slope(const real *restrict R_end, const real *restrict x,
+int mstmm_sweep_modal_frame_motion_slope(const real *restrict R_end, const real *restrict x,
     const real *restrict Psi, const real *restrict xd, const real *restrict Psid,
     const real *restrict xdd, const real *restrict Psidd, const real *restrict d_x,
     const real *restrict d_Psi, const real *restrict d_xd, const real *restrict d_Psid,
@@ -8850,13 +8850,13 @@ int mstmm_sweep_modal_inward_slope(const real *restrict R_end, const real *restr
     return 0;
 }
 
-static int mstmm_sweep_modal_inward_slope_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_modal_frame_motion_slope_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_modal_inward_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], out[0], out[1], out[2], out[3], out[4], out[5]);
+    return mstmm_sweep_modal_frame_motion_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], out[0], out[1], out[2], out[3], out[4], out[5]);
 }
 
-static const mstmm_port mstmm_sweep_modal_inward_slope_inputs[] = {
+static const mstmm_port mstmm_sweep_modal_frame_motion_slope_inputs[] = {
     {"R_end", 9, "", 0, 0},
     {"x", 3, "m", 0, 0},
     {"Psi", 3, "rad", 0, 0},
@@ -8872,7 +8872,7 @@ static const mstmm_port mstmm_sweep_modal_inward_slope_inputs[] = {
     {"d_Psidd", 3, "rad/s2", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_modal_inward_slope_outputs[] = {
+static const mstmm_port mstmm_sweep_modal_frame_motion_slope_outputs[] = {
     {"d_R", 9, "", 0, 0},
     {"d_d", 3, "m", 0, 0},
     {"d_H6", 36, "", 0, 0},
@@ -9082,7 +9082,7 @@ static const mstmm_port mstmm_sweep_modal_subspace_slope_outputs[] = {
     {"d_H", 6, "", 0, 1},
 };
 
-/* imposed and its derivative along a direction
+/* prescribed_bias and its derivative along a direction
  * source: Shabana, Dynamics of Multibody Systems, ch. 5 (floating frame of reference)
  * source: Schwertassek, Wallrapp, Dynamik flexibler Mehrkoerpersysteme (invariants, unit loads)
  * source: Rui, Wang, Zhang, ch. 8 (rigid-flexible systems)
@@ -9095,9 +9095,9 @@ static const mstmm_port mstmm_sweep_modal_subspace_slope_outputs[] = {
  * out d_c_s[6] derivative of c_s
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_modal_imposed_slope_sized(int n, const real *restrict H, const real *restrict s,
-    const real *restrict c, const real *restrict d_H, const real *restrict d_s,
-    const real *restrict d_c, real *restrict d_c_s)
+int mstmm_sweep_modal_prescribed_bias_slope_sized(int n, const real *restrict H,
+    const real *restrict s, const real *restrict c, const real *restrict d_H,
+    const real *restrict d_s, const real *restrict d_c, real *restrict d_c_s)
 {
     (void)c;
     real t3 = 0;
@@ -9157,25 +9157,25 @@ int mstmm_sweep_modal_imposed_slope_sized(int n, const real *restrict H, const r
     return 0;
 }
 
-int mstmm_sweep_modal_imposed_slope(int n, const real *restrict H, const real *restrict s,
+int mstmm_sweep_modal_prescribed_bias_slope(int n, const real *restrict H, const real *restrict s,
     const real *restrict c, const real *restrict d_H, const real *restrict d_s,
     const real *restrict d_c, real *restrict d_c_s)
 {
     switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_modal_imposed_slope_sized(1, H, s, c, d_H, d_s, d_c, d_c_s);
-    case 2: return mstmm_sweep_modal_imposed_slope_sized(2, H, s, c, d_H, d_s, d_c, d_c_s);
-    case 3: return mstmm_sweep_modal_imposed_slope_sized(3, H, s, c, d_H, d_s, d_c, d_c_s);
-    case 4: return mstmm_sweep_modal_imposed_slope_sized(4, H, s, c, d_H, d_s, d_c, d_c_s);
-    default: return mstmm_sweep_modal_imposed_slope_sized(n, H, s, c, d_H, d_s, d_c, d_c_s);
+    case 1: return mstmm_sweep_modal_prescribed_bias_slope_sized(1, H, s, c, d_H, d_s, d_c, d_c_s);
+    case 2: return mstmm_sweep_modal_prescribed_bias_slope_sized(2, H, s, c, d_H, d_s, d_c, d_c_s);
+    case 3: return mstmm_sweep_modal_prescribed_bias_slope_sized(3, H, s, c, d_H, d_s, d_c, d_c_s);
+    case 4: return mstmm_sweep_modal_prescribed_bias_slope_sized(4, H, s, c, d_H, d_s, d_c, d_c_s);
+    default: return mstmm_sweep_modal_prescribed_bias_slope_sized(n, H, s, c, d_H, d_s, d_c, d_c_s);
     }
 }
 
-static int mstmm_sweep_modal_imposed_slope_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_modal_prescribed_bias_slope_call(int n, const real *const *in, real *const *out)
 {
-    return mstmm_sweep_modal_imposed_slope(n, in[0], in[1], in[2], in[3], in[4], in[5], out[0]);
+    return mstmm_sweep_modal_prescribed_bias_slope(n, in[0], in[1], in[2], in[3], in[4], in[5], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_modal_imposed_slope_inputs[] = {
+static const mstmm_port mstmm_sweep_modal_prescribed_bias_slope_inputs[] = {
     {"H", 6, "", 0, 1},
     {"s", 1, "", 0, 1},
     {"c", 6, "m/s2, rad/s2", 0, 0},
@@ -9184,11 +9184,11 @@ static const mstmm_port mstmm_sweep_modal_imposed_slope_inputs[] = {
     {"d_c", 6, "m/s2, rad/s2", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_modal_imposed_slope_outputs[] = {
+static const mstmm_port mstmm_sweep_modal_prescribed_bias_slope_outputs[] = {
     {"d_c_s", 6, "", 0, 0},
 };
 
-/* prescribed and its derivative along a direction
+/* prescribed_load and its derivative along a direction
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  S_rf[6][n] rows of the frame, columns of the modes: [Ct; Gt]
@@ -9200,7 +9200,7 @@ static const mstmm_port mstmm_sweep_modal_imposed_slope_outputs[] = {
  * out d_e_f[n] derivative of e_f, added to what is there
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_modal_prescribed_slope_sized(int n, const real *restrict S_rf,
+int mstmm_sweep_modal_prescribed_load_slope_sized(int n, const real *restrict S_rf,
     const real *restrict S_ff, const real *restrict s, const real *restrict d_S_rf,
     const real *restrict d_s, real *restrict d_e, real *restrict d_e_f)
 {
@@ -9263,25 +9263,25 @@ int mstmm_sweep_modal_prescribed_slope_sized(int n, const real *restrict S_rf,
     return 0;
 }
 
-int mstmm_sweep_modal_prescribed_slope(int n, const real *restrict S_rf, const real *restrict S_ff,
-    const real *restrict s, const real *restrict d_S_rf, const real *restrict d_s,
-    real *restrict d_e, real *restrict d_e_f)
+int mstmm_sweep_modal_prescribed_load_slope(int n, const real *restrict S_rf,
+    const real *restrict S_ff, const real *restrict s, const real *restrict d_S_rf,
+    const real *restrict d_s, real *restrict d_e, real *restrict d_e_f)
 {
     switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_modal_prescribed_slope_sized(1, S_rf, S_ff, s, d_S_rf, d_s, d_e, d_e_f);
-    case 2: return mstmm_sweep_modal_prescribed_slope_sized(2, S_rf, S_ff, s, d_S_rf, d_s, d_e, d_e_f);
-    case 3: return mstmm_sweep_modal_prescribed_slope_sized(3, S_rf, S_ff, s, d_S_rf, d_s, d_e, d_e_f);
-    case 4: return mstmm_sweep_modal_prescribed_slope_sized(4, S_rf, S_ff, s, d_S_rf, d_s, d_e, d_e_f);
-    default: return mstmm_sweep_modal_prescribed_slope_sized(n, S_rf, S_ff, s, d_S_rf, d_s, d_e, d_e_f);
+    case 1: return mstmm_sweep_modal_prescribed_load_slope_sized(1, S_rf, S_ff, s, d_S_rf, d_s, d_e, d_e_f);
+    case 2: return mstmm_sweep_modal_prescribed_load_slope_sized(2, S_rf, S_ff, s, d_S_rf, d_s, d_e, d_e_f);
+    case 3: return mstmm_sweep_modal_prescribed_load_slope_sized(3, S_rf, S_ff, s, d_S_rf, d_s, d_e, d_e_f);
+    case 4: return mstmm_sweep_modal_prescribed_load_slope_sized(4, S_rf, S_ff, s, d_S_rf, d_s, d_e, d_e_f);
+    default: return mstmm_sweep_modal_prescribed_load_slope_sized(n, S_rf, S_ff, s, d_S_rf, d_s, d_e, d_e_f);
     }
 }
 
-static int mstmm_sweep_modal_prescribed_slope_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_modal_prescribed_load_slope_call(int n, const real *const *in, real *const *out)
 {
-    return mstmm_sweep_modal_prescribed_slope(n, in[0], in[1], in[2], in[3], in[4], out[0], out[1]);
+    return mstmm_sweep_modal_prescribed_load_slope(n, in[0], in[1], in[2], in[3], in[4], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_modal_prescribed_slope_inputs[] = {
+static const mstmm_port mstmm_sweep_modal_prescribed_load_slope_inputs[] = {
     {"S_rf", 6, "", 0, 1},
     {"S_ff", 1, "", 0, 2},
     {"s", 1, "", 0, 1},
@@ -9289,7 +9289,7 @@ static const mstmm_port mstmm_sweep_modal_prescribed_slope_inputs[] = {
     {"d_s", 1, "", 0, 1},
 };
 
-static const mstmm_port mstmm_sweep_modal_prescribed_slope_outputs[] = {
+static const mstmm_port mstmm_sweep_modal_prescribed_load_slope_outputs[] = {
     {"d_e", 6, "N, N*m", 1, 0},
     {"d_e_f", 1, "", 1, 1},
 };
@@ -9422,28 +9422,28 @@ static const mstmm_kernel mstmm_sweep_modal_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "outward",
-        .function = (void (*)(void))mstmm_sweep_modal_outward,
-        .call = mstmm_sweep_modal_outward_call,
+        .name = "end_motion",
+        .function = (void (*)(void))mstmm_sweep_modal_end_motion,
+        .call = mstmm_sweep_modal_end_motion_call,
         .n_inputs = 7,
         .n_outputs = 6,
-        .inputs = mstmm_sweep_modal_outward_inputs,
-        .outputs = mstmm_sweep_modal_outward_outputs,
-        .ir_hash = "50c50c723d0ca93d466743ebf35ee19bf35a0ebb03012115488cd46a6feb45f3",
+        .inputs = mstmm_sweep_modal_end_motion_inputs,
+        .outputs = mstmm_sweep_modal_end_motion_outputs,
+        .ir_hash = "43f9a513099fa377dd8e1f2b6281eae0e30bfcdb5a2e7a5625548bf0da952d94",
         .n_guards = 1,
-        .guards = mstmm_sweep_modal_outward_guards,
+        .guards = mstmm_sweep_modal_end_motion_guards,
     },
     {
-        .name = "inward",
-        .function = (void (*)(void))mstmm_sweep_modal_inward,
-        .call = mstmm_sweep_modal_inward_call,
+        .name = "frame_motion",
+        .function = (void (*)(void))mstmm_sweep_modal_frame_motion,
+        .call = mstmm_sweep_modal_frame_motion_call,
         .n_inputs = 7,
         .n_outputs = 6,
-        .inputs = mstmm_sweep_modal_inward_inputs,
-        .outputs = mstmm_sweep_modal_inward_outputs,
-        .ir_hash = "80814e37260aec37dde5063a169017ccd2c2f627fce3d6db26d0287319d00b68",
+        .inputs = mstmm_sweep_modal_frame_motion_inputs,
+        .outputs = mstmm_sweep_modal_frame_motion_outputs,
+        .ir_hash = "c5afdbeff30ed79f87f8d613b2780850e5f6f7b774e678adea1eaa29f48f7467",
         .n_guards = 1,
-        .guards = mstmm_sweep_modal_inward_guards,
+        .guards = mstmm_sweep_modal_frame_motion_guards,
     },
     {
         .name = "subspace",
@@ -9458,26 +9458,26 @@ static const mstmm_kernel mstmm_sweep_modal_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "imposed",
-        .function = (void (*)(void))mstmm_sweep_modal_imposed,
-        .call = mstmm_sweep_modal_imposed_call,
+        .name = "prescribed_bias",
+        .function = (void (*)(void))mstmm_sweep_modal_prescribed_bias,
+        .call = mstmm_sweep_modal_prescribed_bias_call,
         .n_inputs = 3,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_modal_imposed_inputs,
-        .outputs = mstmm_sweep_modal_imposed_outputs,
-        .ir_hash = "b271213c1cf59a4a6f862d68e89f874b39e6134ce62af49716ce23b7c88b4c51",
+        .inputs = mstmm_sweep_modal_prescribed_bias_inputs,
+        .outputs = mstmm_sweep_modal_prescribed_bias_outputs,
+        .ir_hash = "2d726b7d582e90b91907be5705c9e080025ce98ce5ef5ca4799d7b065940e99b",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "absorb",
-        .function = (void (*)(void))mstmm_sweep_modal_absorb,
-        .call = mstmm_sweep_modal_absorb_call,
+        .name = "assemble_port",
+        .function = (void (*)(void))mstmm_sweep_modal_assemble_port,
+        .call = mstmm_sweep_modal_assemble_port_call,
         .n_inputs = 5,
         .n_outputs = 4,
-        .inputs = mstmm_sweep_modal_absorb_inputs,
-        .outputs = mstmm_sweep_modal_absorb_outputs,
-        .ir_hash = "317201b1695764eb8b4c5ff23e04a08f2309d642a7ba5553c42be0302934de64",
+        .inputs = mstmm_sweep_modal_assemble_port_inputs,
+        .outputs = mstmm_sweep_modal_assemble_port_outputs,
+        .ir_hash = "30002e99838e363b0f3a6f5f25d729994b04daac6099431bcf7e6d73d82234ae",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -9518,26 +9518,26 @@ static const mstmm_kernel mstmm_sweep_modal_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "displaced",
-        .function = (void (*)(void))mstmm_sweep_modal_displaced,
-        .call = mstmm_sweep_modal_displaced_call,
+        .name = "port_deviation",
+        .function = (void (*)(void))mstmm_sweep_modal_port_deviation,
+        .call = mstmm_sweep_modal_port_deviation_call,
         .n_inputs = 3,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_modal_displaced_inputs,
-        .outputs = mstmm_sweep_modal_displaced_outputs,
-        .ir_hash = "6b49da6849410814a25237b41318f56690bc9068712f8d6615e8a39dcb6f06e3",
+        .inputs = mstmm_sweep_modal_port_deviation_inputs,
+        .outputs = mstmm_sweep_modal_port_deviation_outputs,
+        .ir_hash = "8975587b446f7853c32b6f049b1f22d2e8da01237dbd525d94a4bf46d72745f7",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "prescribed",
-        .function = (void (*)(void))mstmm_sweep_modal_prescribed,
-        .call = mstmm_sweep_modal_prescribed_call,
+        .name = "prescribed_load",
+        .function = (void (*)(void))mstmm_sweep_modal_prescribed_load,
+        .call = mstmm_sweep_modal_prescribed_load_call,
         .n_inputs = 3,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_modal_prescribed_inputs,
-        .outputs = mstmm_sweep_modal_prescribed_outputs,
-        .ir_hash = "de5290959a1438760c1d0bbfded7cb39a4115ed9f97e79175fe40cc23f37d202",
+        .inputs = mstmm_sweep_modal_prescribed_load_inputs,
+        .outputs = mstmm_sweep_modal_prescribed_load_outputs,
+        .ir_hash = "ab38b6f5add6558728be3715b7970037e68b20ce4b1c0de37d68960a97c10644",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -9554,98 +9554,98 @@ static const mstmm_kernel mstmm_sweep_modal_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "pushed",
-        .function = (void (*)(void))mstmm_sweep_modal_pushed,
-        .call = mstmm_sweep_modal_pushed_call,
+        .name = "column_load",
+        .function = (void (*)(void))mstmm_sweep_modal_column_load,
+        .call = mstmm_sweep_modal_column_load_call,
         .n_inputs = 3,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_modal_pushed_inputs,
-        .outputs = mstmm_sweep_modal_pushed_outputs,
-        .ir_hash = "8cdd9b5d635f8a3ba2bc0d1bd8aa72fbb3519b9a3f478dbb64018400c69c0269",
+        .inputs = mstmm_sweep_modal_column_load_inputs,
+        .outputs = mstmm_sweep_modal_column_load_outputs,
+        .ir_hash = "d582b01a6e20069acb3ff9f1ca7776e083d16eb51d4783982b0d6db984e8a0d5",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "answer",
-        .function = (void (*)(void))mstmm_sweep_modal_answer,
-        .call = mstmm_sweep_modal_answer_call,
+        .name = "column_acceleration",
+        .function = (void (*)(void))mstmm_sweep_modal_column_acceleration,
+        .call = mstmm_sweep_modal_column_acceleration_call,
         .n_inputs = 4,
         .n_outputs = 3,
-        .inputs = mstmm_sweep_modal_answer_inputs,
-        .outputs = mstmm_sweep_modal_answer_outputs,
-        .ir_hash = "fb8143799772d005e805d856cf67511f7650357377cac5defe098d483ee80414",
+        .inputs = mstmm_sweep_modal_column_acceleration_inputs,
+        .outputs = mstmm_sweep_modal_column_acceleration_outputs,
+        .ir_hash = "1a35f072c58a847a005ade89d40201eb6bbcc3ef04960142517165e8091a426a",
         .n_guards = 1,
-        .guards = mstmm_sweep_modal_answer_guards,
+        .guards = mstmm_sweep_modal_column_acceleration_guards,
     },
     {
-        .name = "stiffened",
-        .function = (void (*)(void))mstmm_sweep_modal_stiffened,
-        .call = mstmm_sweep_modal_stiffened_call,
+        .name = "step_stiffness",
+        .function = (void (*)(void))mstmm_sweep_modal_step_stiffness,
+        .call = mstmm_sweep_modal_step_stiffness_call,
         .n_inputs = 4,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_modal_stiffened_inputs,
-        .outputs = mstmm_sweep_modal_stiffened_outputs,
-        .ir_hash = "14a6d4a80ba7e9b4a04b93af160632cbcf1ef8320cfc99855577d8cf74a51f17",
+        .inputs = mstmm_sweep_modal_step_stiffness_inputs,
+        .outputs = mstmm_sweep_modal_step_stiffness_outputs,
+        .ir_hash = "d06cbd29f326f0b422e4f360be1b565134f7271d734a307de49f311cd2183f59",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "strained",
-        .function = (void (*)(void))mstmm_sweep_modal_strained,
-        .call = mstmm_sweep_modal_strained_call,
+        .name = "strain_load",
+        .function = (void (*)(void))mstmm_sweep_modal_strain_load,
+        .call = mstmm_sweep_modal_strain_load_call,
         .n_inputs = 4,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_modal_strained_inputs,
-        .outputs = mstmm_sweep_modal_strained_outputs,
-        .ir_hash = "e1580bd01b79041a9ec958293c1cd70de2e6657a38a9eba4a18a227972a9c59b",
+        .inputs = mstmm_sweep_modal_strain_load_inputs,
+        .outputs = mstmm_sweep_modal_strain_load_outputs,
+        .ir_hash = "977ba7f80ebc36a1ea85ea3b33e08cc7577142a75346c94215ac5326c50d9fa9",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "row_felt",
-        .function = (void (*)(void))mstmm_sweep_modal_row_felt,
-        .call = mstmm_sweep_modal_row_felt_call,
+        .name = "modal_column",
+        .function = (void (*)(void))mstmm_sweep_modal_modal_column,
+        .call = mstmm_sweep_modal_modal_column_call,
         .n_inputs = 2,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_modal_row_felt_inputs,
-        .outputs = mstmm_sweep_modal_row_felt_outputs,
-        .ir_hash = "52c3a0e712377b7cd9359370a6c4b4ea4382b25cfc03f88cd95124c0009d772e",
+        .inputs = mstmm_sweep_modal_modal_column_inputs,
+        .outputs = mstmm_sweep_modal_modal_column_outputs,
+        .ir_hash = "dee2750b61c474501f8228dc31312dc8f7db9967063ddb29a5b2ffb569ad8ef2",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "row_condensed",
-        .function = (void (*)(void))mstmm_sweep_modal_row_condensed,
-        .call = mstmm_sweep_modal_row_condensed_call,
+        .name = "condense_row",
+        .function = (void (*)(void))mstmm_sweep_modal_condense_row,
+        .call = mstmm_sweep_modal_condense_row_call,
         .n_inputs = 3,
         .n_outputs = 4,
-        .inputs = mstmm_sweep_modal_row_condensed_inputs,
-        .outputs = mstmm_sweep_modal_row_condensed_outputs,
-        .ir_hash = "a0e3d6e5f9f0debf6fa9c65e8971b733c5bf33990108af3d7eae8eb4ceabf3ad",
+        .inputs = mstmm_sweep_modal_condense_row_inputs,
+        .outputs = mstmm_sweep_modal_condense_row_outputs,
+        .ir_hash = "d547d71365f50fb532772d60150f6f97eee78bcdd00b9aaa67785b98df48ffb1",
         .n_guards = 1,
-        .guards = mstmm_sweep_modal_row_condensed_guards,
+        .guards = mstmm_sweep_modal_condense_row_guards,
     },
     {
-        .name = "row_coupled",
-        .function = (void (*)(void))mstmm_sweep_modal_row_coupled,
-        .call = mstmm_sweep_modal_row_coupled_call,
+        .name = "row_coupling",
+        .function = (void (*)(void))mstmm_sweep_modal_row_coupling,
+        .call = mstmm_sweep_modal_row_coupling_call,
         .n_inputs = 2,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_modal_row_coupled_inputs,
-        .outputs = mstmm_sweep_modal_row_coupled_outputs,
-        .ir_hash = "6f1599de88e88b91ad6f21cf5eee35007f642144e96e0a06451b4b9ff9d03108",
+        .inputs = mstmm_sweep_modal_row_coupling_inputs,
+        .outputs = mstmm_sweep_modal_row_coupling_outputs,
+        .ir_hash = "0ead0db280aa87ebaf0e566f7ae467ac84db22601ea4976a3ee774987ac0a920",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "row_answered",
-        .function = (void (*)(void))mstmm_sweep_modal_row_answered,
-        .call = mstmm_sweep_modal_row_answered_call,
+        .name = "multiplier_acceleration",
+        .function = (void (*)(void))mstmm_sweep_modal_multiplier_acceleration,
+        .call = mstmm_sweep_modal_multiplier_acceleration_call,
         .n_inputs = 2,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_modal_row_answered_inputs,
-        .outputs = mstmm_sweep_modal_row_answered_outputs,
-        .ir_hash = "b2fa08e9def1b2652b14283e92c0cb73e68a8a5fd637283c7e5abc49a86d0a4a",
+        .inputs = mstmm_sweep_modal_multiplier_acceleration_inputs,
+        .outputs = mstmm_sweep_modal_multiplier_acceleration_outputs,
+        .ir_hash = "dc3c964a08a8ef7cf76a93e0431ef641d6d4134104dd69396474c7b5097efd02",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -9686,26 +9686,26 @@ static const mstmm_kernel mstmm_sweep_modal_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "outward_slope",
-        .function = (void (*)(void))mstmm_sweep_modal_outward_slope,
-        .call = mstmm_sweep_modal_outward_slope_call,
+        .name = "end_motion_slope",
+        .function = (void (*)(void))mstmm_sweep_modal_end_motion_slope,
+        .call = mstmm_sweep_modal_end_motion_slope_call,
         .n_inputs = 13,
         .n_outputs = 6,
-        .inputs = mstmm_sweep_modal_outward_slope_inputs,
-        .outputs = mstmm_sweep_modal_outward_slope_outputs,
-        .ir_hash = "8f2901cba4deb908cb02f43d0e393418a063d71cbbf8aaea1c3d09be7d0c692a",
+        .inputs = mstmm_sweep_modal_end_motion_slope_inputs,
+        .outputs = mstmm_sweep_modal_end_motion_slope_outputs,
+        .ir_hash = "10fccd1d1fc9cae48b9f1dbec3486a614fe9fff13eaa73d80be4c633a52d848c",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "inward_slope",
-        .function = (void (*)(void))mstmm_sweep_modal_inward_slope,
-        .call = mstmm_sweep_modal_inward_slope_call,
+        .name = "frame_motion_slope",
+        .function = (void (*)(void))mstmm_sweep_modal_frame_motion_slope,
+        .call = mstmm_sweep_modal_frame_motion_slope_call,
         .n_inputs = 13,
         .n_outputs = 6,
-        .inputs = mstmm_sweep_modal_inward_slope_inputs,
-        .outputs = mstmm_sweep_modal_inward_slope_outputs,
-        .ir_hash = "719b175eb317ac6e96e5f9442483c18ab677f5d01b2d29cbce08a0f0e8a41e85",
+        .inputs = mstmm_sweep_modal_frame_motion_slope_inputs,
+        .outputs = mstmm_sweep_modal_frame_motion_slope_outputs,
+        .ir_hash = "5a89cbe9ec3c3f06397fc39e72827f162aa3174b791bd3cd87c8fef904c6439f",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -9722,26 +9722,26 @@ static const mstmm_kernel mstmm_sweep_modal_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "imposed_slope",
-        .function = (void (*)(void))mstmm_sweep_modal_imposed_slope,
-        .call = mstmm_sweep_modal_imposed_slope_call,
+        .name = "prescribed_bias_slope",
+        .function = (void (*)(void))mstmm_sweep_modal_prescribed_bias_slope,
+        .call = mstmm_sweep_modal_prescribed_bias_slope_call,
         .n_inputs = 6,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_modal_imposed_slope_inputs,
-        .outputs = mstmm_sweep_modal_imposed_slope_outputs,
-        .ir_hash = "0b90c2871b8d4e57472f89b76b5e6545d7f43b46ec984ccc0d199f8953e51533",
+        .inputs = mstmm_sweep_modal_prescribed_bias_slope_inputs,
+        .outputs = mstmm_sweep_modal_prescribed_bias_slope_outputs,
+        .ir_hash = "c026525651375df7e3fee89ece78633051518219d491a365e9aa102dd1289319",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "prescribed_slope",
-        .function = (void (*)(void))mstmm_sweep_modal_prescribed_slope,
-        .call = mstmm_sweep_modal_prescribed_slope_call,
+        .name = "prescribed_load_slope",
+        .function = (void (*)(void))mstmm_sweep_modal_prescribed_load_slope,
+        .call = mstmm_sweep_modal_prescribed_load_slope_call,
         .n_inputs = 5,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_modal_prescribed_slope_inputs,
-        .outputs = mstmm_sweep_modal_prescribed_slope_outputs,
-        .ir_hash = "025ed27d331ff962e8bf77018936dbf7f0bd9f14df1ffdd2930fbc39fee0e673",
+        .inputs = mstmm_sweep_modal_prescribed_load_slope_inputs,
+        .outputs = mstmm_sweep_modal_prescribed_load_slope_outputs,
+        .ir_hash = "2aa45a3f6c8ff818f8686574df419b968d042a0d902811e019f0d55d095908ab",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -9763,7 +9763,7 @@ const mstmm_element mstmm_sweep_modal = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "modal",
-    .hash = "2cb37473fdbbf3a886757c6770bfad8f30789073f7e7e3d634fcf711309bcb55",
+    .hash = "c39d4466944b17d9a62288ab36b747e55d24d4043ce1835763dc8d737af3e8b1",
     .nq = 0,
     .nu = 0,
     .np = 0,

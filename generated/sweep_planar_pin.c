@@ -21,7 +21,7 @@ int mstmm_sweep_planar_pin_velocity(const real *restrict Rc, const real *restric
 int mstmm_sweep_planar_pin_point(const real *restrict A, const real *restrict x,
     const real *restrict v, const real *restrict motion, const real *restrict offset,
     real *restrict x_K, real *restrict v_K);
-int mstmm_sweep_planar_pin_turning(const real *restrict A, const real *restrict motion,
+int mstmm_sweep_planar_pin_angular_motion(const real *restrict A, const real *restrict motion,
     real *restrict w_K);
 int mstmm_sweep_planar_pin_end_frame(const real *restrict A, const real *restrict R_end,
     real *restrict A_end);
@@ -30,21 +30,22 @@ int mstmm_sweep_planar_pin_applied_load(const real *restrict A, const real *rest
 int mstmm_sweep_planar_pin_factor(const real *restrict Rc, const real *restrict r,
     const real *restrict J, const real *restrict floor_, const real *restrict S, real *restrict F,
     real *restrict G, real *restrict S_I);
-int mstmm_sweep_planar_pin_push(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_planar_pin_column_load(const real *restrict Rc, const real *restrict r,
     const real *restrict G, const real *restrict e, const real *restrict tau, real *restrict y,
     real *restrict e_I);
-int mstmm_sweep_planar_pin_answer(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_planar_pin_column_acceleration(const real *restrict Rc, const real *restrict r,
     const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 int mstmm_sweep_planar_pin_divide(const real *restrict F, const real *restrict y, real *restrict z);
 int mstmm_sweep_planar_pin_couple(const real *restrict y, const real *restrict z,
     real *restrict L_ij);
-int mstmm_sweep_planar_pin_answered(const real *restrict y, const real *restrict z,
+int mstmm_sweep_planar_pin_add_known_part(const real *restrict y, const real *restrict z,
     real *restrict l);
-int mstmm_sweep_planar_pin_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
-int mstmm_sweep_planar_pin_push_on_ground(const real *restrict e, const real *restrict tau,
+int mstmm_sweep_planar_pin_add_multiplier_effort(const real *restrict y, const real *restrict x,
+    real *restrict y_0);
+int mstmm_sweep_planar_pin_ground_column_load(const real *restrict e, const real *restrict tau,
     real *restrict y);
-int mstmm_sweep_planar_pin_meet(const real *restrict A_C, const real *restrict x_C,
+int mstmm_sweep_planar_pin_relative_pose(const real *restrict A_C, const real *restrict x_C,
     const real *restrict A_B, const real *restrict x_B, const real *restrict r_e,
     const real *restrict Rc, const real *restrict r, real *restrict R_C, real *restrict r_A,
     real *restrict d);
@@ -57,18 +58,19 @@ int mstmm_sweep_planar_pin_drift(const real *restrict R_C, const real *restrict 
 int mstmm_sweep_planar_pin_row(const real *restrict w, const real *restrict R_C,
     const real *restrict r_e, const real *restrict Rc, const real *restrict r_A, real *restrict J_A,
     real *restrict J_B);
-int mstmm_sweep_planar_pin_known(const real *restrict W, const real *restrict relative,
+int mstmm_sweep_planar_pin_known_parts(const real *restrict W, const real *restrict relative,
     real *restrict l);
-int mstmm_sweep_planar_pin_told(const real *restrict J_A, const real *restrict J_B,
+int mstmm_sweep_planar_pin_row_acceleration(const real *restrict J_A, const real *restrict J_B,
     const real *restrict l, const real *restrict delta_A, const real *restrict delta_B,
     real *restrict c);
-int mstmm_sweep_planar_pin_act(const real *restrict J, const real *restrict tau, real *restrict e);
-int mstmm_sweep_planar_pin_close(const real *restrict inverse, const real *restrict K,
+int mstmm_sweep_planar_pin_apply_effort(const real *restrict J, const real *restrict tau,
+    real *restrict e);
+int mstmm_sweep_planar_pin_eliminate_row(const real *restrict inverse, const real *restrict K,
     const real *restrict l, real *restrict S, real *restrict e);
-int mstmm_sweep_planar_pin_shed(const real *restrict inverse, const real *restrict K,
+int mstmm_sweep_planar_pin_update_column(const real *restrict inverse, const real *restrict K,
     const real *restrict L_p, real *restrict K_p);
-int mstmm_sweep_planar_pin_multiplier_more(const real *restrict inverse, const real *restrict K,
-    const real *restrict delta, real *restrict x);
+int mstmm_sweep_planar_pin_multiplier_of_motion(const real *restrict inverse,
+    const real *restrict K, const real *restrict delta, real *restrict x);
 
 /* bias motion outboard of the pin hinge, in a plane
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -379,7 +381,7 @@ static const mstmm_port mstmm_sweep_planar_pin_point_outputs[] = {
  * in  motion[4] bias motion of the body: w, wd, rdd of its P, own axes
  * out w_K[3] (rad/s) angular velocity, inertial axes
  */
-int mstmm_sweep_planar_pin_turning(const real *restrict A, const real *restrict motion,
+int mstmm_sweep_planar_pin_angular_motion(const real *restrict A, const real *restrict motion,
     real *restrict w_K)
 {
     (void)A;
@@ -389,18 +391,18 @@ int mstmm_sweep_planar_pin_turning(const real *restrict A, const real *restrict 
     return 0;
 }
 
-static int mstmm_sweep_planar_pin_turning_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_planar_pin_angular_motion_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_planar_pin_turning(in[0], in[1], out[0]);
+    return mstmm_sweep_planar_pin_angular_motion(in[0], in[1], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_planar_pin_turning_inputs[] = {
+static const mstmm_port mstmm_sweep_planar_pin_angular_motion_inputs[] = {
     {"A", 2, "", 0, 0},
     {"motion", 4, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_planar_pin_turning_outputs[] = {
+static const mstmm_port mstmm_sweep_planar_pin_angular_motion_outputs[] = {
     {"w_K", 3, "rad/s", 0, 0},
 };
 
@@ -661,7 +663,7 @@ static const mstmm_guard mstmm_sweep_planar_pin_factor_guards[] = {
  * out y[1] (N, N*m) tau - H^T e
  * out e_I[3] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_planar_pin_push(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_planar_pin_column_load(const real *restrict Rc, const real *restrict r,
     const real *restrict G, const real *restrict e, const real *restrict tau, real *restrict y,
     real *restrict e_I)
 {
@@ -695,13 +697,13 @@ int mstmm_sweep_planar_pin_push(const real *restrict Rc, const real *restrict r,
     return 0;
 }
 
-static int mstmm_sweep_planar_pin_push_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_planar_pin_column_load_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_planar_pin_push(in[0], in[1], in[2], in[3], in[4], out[0], out[1]);
+    return mstmm_sweep_planar_pin_column_load(in[0], in[1], in[2], in[3], in[4], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_planar_pin_push_inputs[] = {
+static const mstmm_port mstmm_sweep_planar_pin_column_load_inputs[] = {
     {"Rc", 2, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"G", 3, "", 0, 0},
@@ -709,7 +711,7 @@ static const mstmm_port mstmm_sweep_planar_pin_push_inputs[] = {
     {"tau", 1, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_planar_pin_push_outputs[] = {
+static const mstmm_port mstmm_sweep_planar_pin_column_load_outputs[] = {
     {"y", 1, "N, N*m", 0, 0},
     {"e_I", 3, "N, N*m", 1, 0},
 };
@@ -726,7 +728,7 @@ static const mstmm_port mstmm_sweep_planar_pin_push_outputs[] = {
  * out udot[1] accelerations of the free coordinates
  * out delta[3] deviation of the body's acceleration, at P
  */
-int mstmm_sweep_planar_pin_answer(const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_planar_pin_column_acceleration(const real *restrict Rc, const real *restrict r,
     const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta)
 {
@@ -755,13 +757,13 @@ int mstmm_sweep_planar_pin_answer(const real *restrict Rc, const real *restrict 
     return 0;
 }
 
-static int mstmm_sweep_planar_pin_answer_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_planar_pin_column_acceleration_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_planar_pin_answer(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]);
+    return mstmm_sweep_planar_pin_column_acceleration(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_planar_pin_answer_inputs[] = {
+static const mstmm_port mstmm_sweep_planar_pin_column_acceleration_inputs[] = {
     {"Rc", 2, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"F", 1, "", 0, 0},
@@ -770,7 +772,7 @@ static const mstmm_port mstmm_sweep_planar_pin_answer_inputs[] = {
     {"delta_I", 3, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_planar_pin_answer_outputs[] = {
+static const mstmm_port mstmm_sweep_planar_pin_column_acceleration_outputs[] = {
     {"udot", 1, "", 0, 0},
     {"delta", 3, "", 0, 0},
 };
@@ -841,7 +843,7 @@ static const mstmm_port mstmm_sweep_planar_pin_couple_outputs[] = {
  * in  z[1] of the row
  * out l[1] known part of the row, added to what is there
  */
-int mstmm_sweep_planar_pin_answered(const real *restrict y, const real *restrict z,
+int mstmm_sweep_planar_pin_add_known_part(const real *restrict y, const real *restrict z,
     real *restrict l)
 {
     const real t0 = y[0] * z[0];
@@ -850,18 +852,18 @@ int mstmm_sweep_planar_pin_answered(const real *restrict y, const real *restrict
     return 0;
 }
 
-static int mstmm_sweep_planar_pin_answered_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_planar_pin_add_known_part_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_planar_pin_answered(in[0], in[1], out[0]);
+    return mstmm_sweep_planar_pin_add_known_part(in[0], in[1], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_planar_pin_answered_inputs[] = {
+static const mstmm_port mstmm_sweep_planar_pin_add_known_part_inputs[] = {
     {"y", 1, "", 0, 0},
     {"z", 1, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_planar_pin_answered_outputs[] = {
+static const mstmm_port mstmm_sweep_planar_pin_add_known_part_outputs[] = {
     {"l", 1, "", 1, 0},
 };
 
@@ -872,25 +874,26 @@ static const mstmm_port mstmm_sweep_planar_pin_answered_outputs[] = {
  * in  x[1] (N, N*m) multiplier
  * out y_0[1] tau - H^T e, added to what is there
  */
-int mstmm_sweep_planar_pin_pull(const real *restrict y, const real *restrict x, real *restrict y_0)
+int mstmm_sweep_planar_pin_add_multiplier_effort(const real *restrict y, const real *restrict x,
+    real *restrict y_0)
 {
     const real t0 = y[0] * x[0];
     y_0[0] += t0;
     return 0;
 }
 
-static int mstmm_sweep_planar_pin_pull_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_planar_pin_add_multiplier_effort_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_planar_pin_pull(in[0], in[1], out[0]);
+    return mstmm_sweep_planar_pin_add_multiplier_effort(in[0], in[1], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_planar_pin_pull_inputs[] = {
+static const mstmm_port mstmm_sweep_planar_pin_add_multiplier_effort_inputs[] = {
     {"y", 1, "", 0, 0},
     {"x", 1, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_planar_pin_pull_outputs[] = {
+static const mstmm_port mstmm_sweep_planar_pin_add_multiplier_effort_outputs[] = {
     {"y_0", 1, "", 1, 0},
 };
 
@@ -901,7 +904,7 @@ static const mstmm_port mstmm_sweep_planar_pin_pull_outputs[] = {
  * in  tau[1] (N, N*m) efforts of the right-hand side on the free coordinates
  * out y[1] (N, N*m) tau - H^T e
  */
-int mstmm_sweep_planar_pin_push_on_ground(const real *restrict e, const real *restrict tau,
+int mstmm_sweep_planar_pin_ground_column_load(const real *restrict e, const real *restrict tau,
     real *restrict y)
 {
     const real t0 = tau[0] - e[2];
@@ -909,18 +912,18 @@ int mstmm_sweep_planar_pin_push_on_ground(const real *restrict e, const real *re
     return 0;
 }
 
-static int mstmm_sweep_planar_pin_push_on_ground_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_planar_pin_ground_column_load_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_planar_pin_push_on_ground(in[0], in[1], out[0]);
+    return mstmm_sweep_planar_pin_ground_column_load(in[0], in[1], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_planar_pin_push_on_ground_inputs[] = {
+static const mstmm_port mstmm_sweep_planar_pin_ground_column_load_inputs[] = {
     {"e", 3, "N, N*m", 0, 0},
     {"tau", 1, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_planar_pin_push_on_ground_outputs[] = {
+static const mstmm_port mstmm_sweep_planar_pin_ground_column_load_outputs[] = {
     {"y", 1, "N, N*m", 0, 0},
 };
 
@@ -938,7 +941,7 @@ static const mstmm_port mstmm_sweep_planar_pin_push_on_ground_outputs[] = {
  * out r_A[2] (m) the end of B from P of A, axes of A
  * out d[2] (m) that end from the origin of C, axes of C
  */
-int mstmm_sweep_planar_pin_meet(const real *restrict A_C, const real *restrict x_C,
+int mstmm_sweep_planar_pin_relative_pose(const real *restrict A_C, const real *restrict x_C,
     const real *restrict A_B, const real *restrict x_B, const real *restrict r_e,
     const real *restrict Rc, const real *restrict r, real *restrict R_C, real *restrict r_A,
     real *restrict d)
@@ -983,13 +986,13 @@ int mstmm_sweep_planar_pin_meet(const real *restrict A_C, const real *restrict x
     return 0;
 }
 
-static int mstmm_sweep_planar_pin_meet_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_planar_pin_relative_pose_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_planar_pin_meet(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2]);
+    return mstmm_sweep_planar_pin_relative_pose(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2]);
 }
 
-static const mstmm_port mstmm_sweep_planar_pin_meet_inputs[] = {
+static const mstmm_port mstmm_sweep_planar_pin_relative_pose_inputs[] = {
     {"A_C", 2, "", 0, 0},
     {"x_C", 3, "m", 0, 0},
     {"A_B", 2, "", 0, 0},
@@ -999,7 +1002,7 @@ static const mstmm_port mstmm_sweep_planar_pin_meet_inputs[] = {
     {"r", 3, "m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_planar_pin_meet_outputs[] = {
+static const mstmm_port mstmm_sweep_planar_pin_relative_pose_outputs[] = {
     {"R_C", 2, "", 0, 0},
     {"r_A", 2, "m", 0, 0},
     {"d", 2, "m", 0, 0},
@@ -1209,7 +1212,7 @@ static const mstmm_port mstmm_sweep_planar_pin_row_outputs[] = {
  * in  relative[3] motion of the end of B relative to C
  * out l[6] known parts of the rows
  */
-int mstmm_sweep_planar_pin_known(const real *restrict W, const real *restrict relative,
+int mstmm_sweep_planar_pin_known_parts(const real *restrict W, const real *restrict relative,
     real *restrict l)
 {
     const real t0 = W[0] * relative[0];
@@ -1251,18 +1254,18 @@ int mstmm_sweep_planar_pin_known(const real *restrict W, const real *restrict re
     return 0;
 }
 
-static int mstmm_sweep_planar_pin_known_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_planar_pin_known_parts_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_planar_pin_known(in[0], in[1], out[0]);
+    return mstmm_sweep_planar_pin_known_parts(in[0], in[1], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_planar_pin_known_inputs[] = {
+static const mstmm_port mstmm_sweep_planar_pin_known_parts_inputs[] = {
     {"W", 18, "", 0, 0},
     {"relative", 3, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_planar_pin_known_outputs[] = {
+static const mstmm_port mstmm_sweep_planar_pin_known_parts_outputs[] = {
     {"l", 6, "", 0, 0},
 };
 
@@ -1276,7 +1279,7 @@ static const mstmm_port mstmm_sweep_planar_pin_known_outputs[] = {
  * in  delta_B[3] deviation of the acceleration of B
  * out c[1] acceleration along the direction
  */
-int mstmm_sweep_planar_pin_told(const real *restrict J_A, const real *restrict J_B,
+int mstmm_sweep_planar_pin_row_acceleration(const real *restrict J_A, const real *restrict J_B,
     const real *restrict l, const real *restrict delta_A, const real *restrict delta_B,
     real *restrict c)
 {
@@ -1296,13 +1299,13 @@ int mstmm_sweep_planar_pin_told(const real *restrict J_A, const real *restrict J
     return 0;
 }
 
-static int mstmm_sweep_planar_pin_told_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_planar_pin_row_acceleration_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_planar_pin_told(in[0], in[1], in[2], in[3], in[4], out[0]);
+    return mstmm_sweep_planar_pin_row_acceleration(in[0], in[1], in[2], in[3], in[4], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_planar_pin_told_inputs[] = {
+static const mstmm_port mstmm_sweep_planar_pin_row_acceleration_inputs[] = {
     {"J_A", 3, "", 0, 0},
     {"J_B", 3, "", 0, 0},
     {"l", 1, "", 0, 0},
@@ -1310,7 +1313,7 @@ static const mstmm_port mstmm_sweep_planar_pin_told_inputs[] = {
     {"delta_B", 3, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_planar_pin_told_outputs[] = {
+static const mstmm_port mstmm_sweep_planar_pin_row_acceleration_outputs[] = {
     {"c", 1, "", 0, 0},
 };
 
@@ -1321,7 +1324,8 @@ static const mstmm_port mstmm_sweep_planar_pin_told_outputs[] = {
  * in  tau[1] (N, N*m) effort
  * out e[3] (N, N*m) force part of f = S a + e, added to what is there
  */
-int mstmm_sweep_planar_pin_act(const real *restrict J, const real *restrict tau, real *restrict e)
+int mstmm_sweep_planar_pin_apply_effort(const real *restrict J, const real *restrict tau,
+    real *restrict e)
 {
     const real t0 = J[0] * tau[0];
     const real t1 = -t0;
@@ -1335,18 +1339,18 @@ int mstmm_sweep_planar_pin_act(const real *restrict J, const real *restrict tau,
     return 0;
 }
 
-static int mstmm_sweep_planar_pin_act_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_planar_pin_apply_effort_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_planar_pin_act(in[0], in[1], out[0]);
+    return mstmm_sweep_planar_pin_apply_effort(in[0], in[1], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_planar_pin_act_inputs[] = {
+static const mstmm_port mstmm_sweep_planar_pin_apply_effort_inputs[] = {
     {"J", 3, "", 0, 0},
     {"tau", 1, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_planar_pin_act_outputs[] = {
+static const mstmm_port mstmm_sweep_planar_pin_apply_effort_outputs[] = {
     {"e", 3, "N, N*m", 1, 0},
 };
 
@@ -1359,7 +1363,7 @@ static const mstmm_port mstmm_sweep_planar_pin_act_outputs[] = {
  * out S[6] S of the body, added to what is there
  * out e[3] e of the body, added to what is there
  */
-int mstmm_sweep_planar_pin_close(const real *restrict inverse, const real *restrict K,
+int mstmm_sweep_planar_pin_eliminate_row(const real *restrict inverse, const real *restrict K,
     const real *restrict l, real *restrict S, real *restrict e)
 {
     const real t0 = inverse[0] * K[0];
@@ -1386,19 +1390,19 @@ int mstmm_sweep_planar_pin_close(const real *restrict inverse, const real *restr
     return 0;
 }
 
-static int mstmm_sweep_planar_pin_close_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_planar_pin_eliminate_row_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_planar_pin_close(in[0], in[1], in[2], out[0], out[1]);
+    return mstmm_sweep_planar_pin_eliminate_row(in[0], in[1], in[2], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_planar_pin_close_inputs[] = {
+static const mstmm_port mstmm_sweep_planar_pin_eliminate_row_inputs[] = {
     {"inverse", 1, "", 0, 0},
     {"K", 3, "", 0, 0},
     {"l", 1, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_planar_pin_close_outputs[] = {
+static const mstmm_port mstmm_sweep_planar_pin_eliminate_row_outputs[] = {
     {"S", 6, "", 1, 0},
     {"e", 3, "", 1, 0},
 };
@@ -1411,7 +1415,7 @@ static const mstmm_port mstmm_sweep_planar_pin_close_outputs[] = {
  * in  L_p[1] entry of L of the eliminated row and another
  * out K_p[3] column of row p, added to what is there
  */
-int mstmm_sweep_planar_pin_shed(const real *restrict inverse, const real *restrict K,
+int mstmm_sweep_planar_pin_update_column(const real *restrict inverse, const real *restrict K,
     const real *restrict L_p, real *restrict K_p)
 {
     const real t0 = K[0] * L_p[0];
@@ -1429,19 +1433,19 @@ int mstmm_sweep_planar_pin_shed(const real *restrict inverse, const real *restri
     return 0;
 }
 
-static int mstmm_sweep_planar_pin_shed_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_planar_pin_update_column_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_planar_pin_shed(in[0], in[1], in[2], out[0]);
+    return mstmm_sweep_planar_pin_update_column(in[0], in[1], in[2], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_planar_pin_shed_inputs[] = {
+static const mstmm_port mstmm_sweep_planar_pin_update_column_inputs[] = {
     {"inverse", 1, "", 0, 0},
     {"K", 3, "", 0, 0},
     {"L_p", 1, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_planar_pin_shed_outputs[] = {
+static const mstmm_port mstmm_sweep_planar_pin_update_column_outputs[] = {
     {"K_p", 3, "", 1, 0},
 };
 
@@ -1453,8 +1457,8 @@ static const mstmm_port mstmm_sweep_planar_pin_shed_outputs[] = {
  * in  delta[3] deviation of the acceleration of the body
  * out x[1] multiplier of row r, added to what is there
  */
-int mstmm_sweep_planar_pin_multiplier_more(const real *restrict inverse, const real *restrict K,
-    const real *restrict delta, real *restrict x)
+int mstmm_sweep_planar_pin_multiplier_of_motion(const real *restrict inverse,
+    const real *restrict K, const real *restrict delta, real *restrict x)
 {
     const real t0 = inverse[0] * K[0];
     const real t1 = delta[0] * t0;
@@ -1468,19 +1472,19 @@ int mstmm_sweep_planar_pin_multiplier_more(const real *restrict inverse, const r
     return 0;
 }
 
-static int mstmm_sweep_planar_pin_multiplier_more_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_planar_pin_multiplier_of_motion_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_planar_pin_multiplier_more(in[0], in[1], in[2], out[0]);
+    return mstmm_sweep_planar_pin_multiplier_of_motion(in[0], in[1], in[2], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_planar_pin_multiplier_more_inputs[] = {
+static const mstmm_port mstmm_sweep_planar_pin_multiplier_of_motion_inputs[] = {
     {"inverse", 1, "", 0, 0},
     {"K", 3, "", 0, 0},
     {"delta", 3, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_planar_pin_multiplier_more_outputs[] = {
+static const mstmm_port mstmm_sweep_planar_pin_multiplier_of_motion_outputs[] = {
     {"x", 1, "", 1, 0},
 };
 
@@ -1558,14 +1562,14 @@ static const mstmm_kernel mstmm_sweep_planar_pin_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "turning",
-        .function = (void (*)(void))mstmm_sweep_planar_pin_turning,
-        .call = mstmm_sweep_planar_pin_turning_call,
+        .name = "angular_motion",
+        .function = (void (*)(void))mstmm_sweep_planar_pin_angular_motion,
+        .call = mstmm_sweep_planar_pin_angular_motion_call,
         .n_inputs = 2,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_planar_pin_turning_inputs,
-        .outputs = mstmm_sweep_planar_pin_turning_outputs,
-        .ir_hash = "4041451e1ade9694a8d7fd5ef2a2cf245fecdbb6cb3a0d5c8039528cc884f399",
+        .inputs = mstmm_sweep_planar_pin_angular_motion_inputs,
+        .outputs = mstmm_sweep_planar_pin_angular_motion_outputs,
+        .ir_hash = "1f53168ea35b81f7f4b175b86239f856aae030b69a270c30b6a470fe50414126",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1606,26 +1610,26 @@ static const mstmm_kernel mstmm_sweep_planar_pin_kernels[] = {
         .guards = mstmm_sweep_planar_pin_factor_guards,
     },
     {
-        .name = "push",
-        .function = (void (*)(void))mstmm_sweep_planar_pin_push,
-        .call = mstmm_sweep_planar_pin_push_call,
+        .name = "column_load",
+        .function = (void (*)(void))mstmm_sweep_planar_pin_column_load,
+        .call = mstmm_sweep_planar_pin_column_load_call,
         .n_inputs = 5,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_planar_pin_push_inputs,
-        .outputs = mstmm_sweep_planar_pin_push_outputs,
-        .ir_hash = "ea148c6bc28fe1fce2e1a278c3119ef00144a62156facdc2eeec93b81e56d068",
+        .inputs = mstmm_sweep_planar_pin_column_load_inputs,
+        .outputs = mstmm_sweep_planar_pin_column_load_outputs,
+        .ir_hash = "8a1ff31209cda5444a711e12923fa89ff87b87e92164dcc13752c3efcf2f054d",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "answer",
-        .function = (void (*)(void))mstmm_sweep_planar_pin_answer,
-        .call = mstmm_sweep_planar_pin_answer_call,
+        .name = "column_acceleration",
+        .function = (void (*)(void))mstmm_sweep_planar_pin_column_acceleration,
+        .call = mstmm_sweep_planar_pin_column_acceleration_call,
         .n_inputs = 6,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_planar_pin_answer_inputs,
-        .outputs = mstmm_sweep_planar_pin_answer_outputs,
-        .ir_hash = "04b89ac4278a12f7a5eaafd6dc01a88a2da3c793b867ec0bc3a05b7591a24bf5",
+        .inputs = mstmm_sweep_planar_pin_column_acceleration_inputs,
+        .outputs = mstmm_sweep_planar_pin_column_acceleration_outputs,
+        .ir_hash = "f2197df01c613433aed6d2595a9384b387065dd920f1bc4801d5ecc33aea757d",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1654,50 +1658,50 @@ static const mstmm_kernel mstmm_sweep_planar_pin_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "answered",
-        .function = (void (*)(void))mstmm_sweep_planar_pin_answered,
-        .call = mstmm_sweep_planar_pin_answered_call,
+        .name = "add_known_part",
+        .function = (void (*)(void))mstmm_sweep_planar_pin_add_known_part,
+        .call = mstmm_sweep_planar_pin_add_known_part_call,
         .n_inputs = 2,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_planar_pin_answered_inputs,
-        .outputs = mstmm_sweep_planar_pin_answered_outputs,
-        .ir_hash = "3c084658becd549560d1ff478a120d8b90a28c418fa1ae6a4081e0d288187b60",
+        .inputs = mstmm_sweep_planar_pin_add_known_part_inputs,
+        .outputs = mstmm_sweep_planar_pin_add_known_part_outputs,
+        .ir_hash = "b76aea48673613afb27c3097d38c07d304d62be327ed59ab8963c76ec6fdeea7",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "pull",
-        .function = (void (*)(void))mstmm_sweep_planar_pin_pull,
-        .call = mstmm_sweep_planar_pin_pull_call,
+        .name = "add_multiplier_effort",
+        .function = (void (*)(void))mstmm_sweep_planar_pin_add_multiplier_effort,
+        .call = mstmm_sweep_planar_pin_add_multiplier_effort_call,
         .n_inputs = 2,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_planar_pin_pull_inputs,
-        .outputs = mstmm_sweep_planar_pin_pull_outputs,
-        .ir_hash = "83fea64b3bacd8e16951f8817042f046960daa292f71fd3763f53f72f2e03a6b",
+        .inputs = mstmm_sweep_planar_pin_add_multiplier_effort_inputs,
+        .outputs = mstmm_sweep_planar_pin_add_multiplier_effort_outputs,
+        .ir_hash = "e21ecdb2e2be7ad2e47ba4f481942a690b56eb0715b06f8a21fe5112a6798cfe",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "push_on_ground",
-        .function = (void (*)(void))mstmm_sweep_planar_pin_push_on_ground,
-        .call = mstmm_sweep_planar_pin_push_on_ground_call,
+        .name = "ground_column_load",
+        .function = (void (*)(void))mstmm_sweep_planar_pin_ground_column_load,
+        .call = mstmm_sweep_planar_pin_ground_column_load_call,
         .n_inputs = 2,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_planar_pin_push_on_ground_inputs,
-        .outputs = mstmm_sweep_planar_pin_push_on_ground_outputs,
-        .ir_hash = "85fa6b3964d125e6c83e7346d9ff3248b6595e9137c48f1edbc49341c8eb7e02",
+        .inputs = mstmm_sweep_planar_pin_ground_column_load_inputs,
+        .outputs = mstmm_sweep_planar_pin_ground_column_load_outputs,
+        .ir_hash = "d0a69d4ed2372d42a0d82c10dafc574fb95ab50d1053f02ef4a46bc728dff541",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "meet",
-        .function = (void (*)(void))mstmm_sweep_planar_pin_meet,
-        .call = mstmm_sweep_planar_pin_meet_call,
+        .name = "relative_pose",
+        .function = (void (*)(void))mstmm_sweep_planar_pin_relative_pose,
+        .call = mstmm_sweep_planar_pin_relative_pose_call,
         .n_inputs = 7,
         .n_outputs = 3,
-        .inputs = mstmm_sweep_planar_pin_meet_inputs,
-        .outputs = mstmm_sweep_planar_pin_meet_outputs,
-        .ir_hash = "c546a338622ed23aebf5b021a5fea76f3a04a83d378b272d2138b9ff3f3cf54d",
+        .inputs = mstmm_sweep_planar_pin_relative_pose_inputs,
+        .outputs = mstmm_sweep_planar_pin_relative_pose_outputs,
+        .ir_hash = "1c7761cd34c7f9127f55b71085fa48552f734c101398fb587e44d0311956fe19",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1738,74 +1742,74 @@ static const mstmm_kernel mstmm_sweep_planar_pin_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "known",
-        .function = (void (*)(void))mstmm_sweep_planar_pin_known,
-        .call = mstmm_sweep_planar_pin_known_call,
+        .name = "known_parts",
+        .function = (void (*)(void))mstmm_sweep_planar_pin_known_parts,
+        .call = mstmm_sweep_planar_pin_known_parts_call,
         .n_inputs = 2,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_planar_pin_known_inputs,
-        .outputs = mstmm_sweep_planar_pin_known_outputs,
-        .ir_hash = "d1ec34caeaa99d82571e5c5f76cd30b24e390eb0797210254d40ff298264c490",
+        .inputs = mstmm_sweep_planar_pin_known_parts_inputs,
+        .outputs = mstmm_sweep_planar_pin_known_parts_outputs,
+        .ir_hash = "a6239a278e51b143cddfc2653297de76d5ca09971643bb4e9c6715cf8c4ef310",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "told",
-        .function = (void (*)(void))mstmm_sweep_planar_pin_told,
-        .call = mstmm_sweep_planar_pin_told_call,
+        .name = "row_acceleration",
+        .function = (void (*)(void))mstmm_sweep_planar_pin_row_acceleration,
+        .call = mstmm_sweep_planar_pin_row_acceleration_call,
         .n_inputs = 5,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_planar_pin_told_inputs,
-        .outputs = mstmm_sweep_planar_pin_told_outputs,
-        .ir_hash = "ea267dc592f043c402aabea4c12d14114726cb353ebe84d9a2eef9a5b7272b0d",
+        .inputs = mstmm_sweep_planar_pin_row_acceleration_inputs,
+        .outputs = mstmm_sweep_planar_pin_row_acceleration_outputs,
+        .ir_hash = "c2483029e4a6a812313d9b2689acbd55409a9bea694504868b96719f9bc21d6f",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "act",
-        .function = (void (*)(void))mstmm_sweep_planar_pin_act,
-        .call = mstmm_sweep_planar_pin_act_call,
+        .name = "apply_effort",
+        .function = (void (*)(void))mstmm_sweep_planar_pin_apply_effort,
+        .call = mstmm_sweep_planar_pin_apply_effort_call,
         .n_inputs = 2,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_planar_pin_act_inputs,
-        .outputs = mstmm_sweep_planar_pin_act_outputs,
-        .ir_hash = "4b743bdcc92302efbd7700ebb8c1995e15bcb06fde8e342ef7b07a57a30ebe9a",
+        .inputs = mstmm_sweep_planar_pin_apply_effort_inputs,
+        .outputs = mstmm_sweep_planar_pin_apply_effort_outputs,
+        .ir_hash = "f36eebe9b3f1e846374b38b05302f5b6cb50399967b199cd78583da39c057fb9",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "close",
-        .function = (void (*)(void))mstmm_sweep_planar_pin_close,
-        .call = mstmm_sweep_planar_pin_close_call,
+        .name = "eliminate_row",
+        .function = (void (*)(void))mstmm_sweep_planar_pin_eliminate_row,
+        .call = mstmm_sweep_planar_pin_eliminate_row_call,
         .n_inputs = 3,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_planar_pin_close_inputs,
-        .outputs = mstmm_sweep_planar_pin_close_outputs,
-        .ir_hash = "9874bd5f5e0244011bab0588e4eb8dbc0645f3cc11c720d1b1017c3147bf7fc0",
+        .inputs = mstmm_sweep_planar_pin_eliminate_row_inputs,
+        .outputs = mstmm_sweep_planar_pin_eliminate_row_outputs,
+        .ir_hash = "e542fd70dd9494e5b7d74b821ec3724b856740469296a4257afc6c1a3fe4ad9e",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "shed",
-        .function = (void (*)(void))mstmm_sweep_planar_pin_shed,
-        .call = mstmm_sweep_planar_pin_shed_call,
+        .name = "update_column",
+        .function = (void (*)(void))mstmm_sweep_planar_pin_update_column,
+        .call = mstmm_sweep_planar_pin_update_column_call,
         .n_inputs = 3,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_planar_pin_shed_inputs,
-        .outputs = mstmm_sweep_planar_pin_shed_outputs,
-        .ir_hash = "b76a4c541e1e6339ccfc5e5dd020d1282a53fdfaab8bb9c950709fa6e83f83b4",
+        .inputs = mstmm_sweep_planar_pin_update_column_inputs,
+        .outputs = mstmm_sweep_planar_pin_update_column_outputs,
+        .ir_hash = "ab09985ff58c32ddebae6cf7302e0c6144d0bdce0ed36bd3023061790c253023",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "multiplier_more",
-        .function = (void (*)(void))mstmm_sweep_planar_pin_multiplier_more,
-        .call = mstmm_sweep_planar_pin_multiplier_more_call,
+        .name = "multiplier_of_motion",
+        .function = (void (*)(void))mstmm_sweep_planar_pin_multiplier_of_motion,
+        .call = mstmm_sweep_planar_pin_multiplier_of_motion_call,
         .n_inputs = 3,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_planar_pin_multiplier_more_inputs,
-        .outputs = mstmm_sweep_planar_pin_multiplier_more_outputs,
-        .ir_hash = "75683f6a1ab29331a87624f828335c3e6ae84d626dee1b44db5ec50f43375935",
+        .inputs = mstmm_sweep_planar_pin_multiplier_of_motion_inputs,
+        .outputs = mstmm_sweep_planar_pin_multiplier_of_motion_outputs,
+        .ir_hash = "1d160be48572d7b1bb7b0d84624b4aa3c5d43060d0a7238663c42de9893fd4ef",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1815,7 +1819,7 @@ const mstmm_element mstmm_sweep_planar_pin = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "planar_pin",
-    .hash = "38f4f2f33f18a15c2a34a32cc4e21cc9458601a5409d130c32e5b4f37e27606f",
+    .hash = "d64ad7a1caabbf6dcaaf36bdb7bcb7fcd4c3a5bacdcf71e1a1310de357b1a9c1",
     .nq = 0,
     .nu = 0,
     .np = 0,

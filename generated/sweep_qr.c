@@ -14,8 +14,8 @@ int mstmm_sweep_qr_bias(const real *restrict U, const real *restrict motion, rea
 int mstmm_sweep_qr_merge(const real *restrict Rc, const real *restrict r, const real *restrict V,
     const real *restrict d_V, const real *restrict e_Q, const real *restrict U_P,
     const real *restrict d_P, real *restrict U, real *restrict d, real *restrict e_I);
-int mstmm_sweep_qr_restored(const real *restrict U, const real *restrict d, const real *restrict e,
-    real *restrict S, real *restrict e_S);
+int mstmm_sweep_qr_rows_to_riccati(const real *restrict U, const real *restrict d,
+    const real *restrict e, real *restrict S, real *restrict e_S);
 
 /* rows of a single body
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -1359,8 +1359,8 @@ static const mstmm_port mstmm_sweep_qr_merge_outputs[] = {
  * out S[21] f = S a + e of everything outboard, at P
  * out e_S[6] (N, N*m) force part of f = S a + e
  */
-int mstmm_sweep_qr_restored(const real *restrict U, const real *restrict d, const real *restrict e,
-    real *restrict S, real *restrict e_S)
+int mstmm_sweep_qr_rows_to_riccati(const real *restrict U, const real *restrict d,
+    const real *restrict e, real *restrict S, real *restrict e_S)
 {
     const real t0 = U[0] * U[0];
     S[0] = t0;
@@ -1525,19 +1525,19 @@ int mstmm_sweep_qr_restored(const real *restrict U, const real *restrict d, cons
     return 0;
 }
 
-static int mstmm_sweep_qr_restored_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_qr_rows_to_riccati_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_qr_restored(in[0], in[1], in[2], out[0], out[1]);
+    return mstmm_sweep_qr_rows_to_riccati(in[0], in[1], in[2], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_qr_restored_inputs[] = {
+static const mstmm_port mstmm_sweep_qr_rows_to_riccati_inputs[] = {
     {"U", 21, "", 0, 0},
     {"d", 6, "", 0, 0},
     {"e", 6, "N, N*m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_qr_restored_outputs[] = {
+static const mstmm_port mstmm_sweep_qr_rows_to_riccati_outputs[] = {
     {"S", 21, "", 0, 0},
     {"e_S", 6, "N, N*m", 0, 0},
 };
@@ -1580,14 +1580,14 @@ static const mstmm_kernel mstmm_sweep_qr_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "restored",
-        .function = (void (*)(void))mstmm_sweep_qr_restored,
-        .call = mstmm_sweep_qr_restored_call,
+        .name = "rows_to_riccati",
+        .function = (void (*)(void))mstmm_sweep_qr_rows_to_riccati,
+        .call = mstmm_sweep_qr_rows_to_riccati_call,
         .n_inputs = 3,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_qr_restored_inputs,
-        .outputs = mstmm_sweep_qr_restored_outputs,
-        .ir_hash = "b0a9cbfe2606c93f34df44ce3dd9a239b0615e3e13835ed5ed5e8bf912e9d248",
+        .inputs = mstmm_sweep_qr_rows_to_riccati_inputs,
+        .outputs = mstmm_sweep_qr_rows_to_riccati_outputs,
+        .ir_hash = "c8857b0ccb1829436fad1426978f42b7852c8a3bf8e58e824426a089273dc668",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1597,7 +1597,7 @@ const mstmm_element mstmm_sweep_qr = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "qr",
-    .hash = "1c773220d0406270cdedbbd72a1bd478f0374040396511058da976956688d02b",
+    .hash = "2b87660376079532168d17cddc43ceeb30ced868828aa85af14a4eaf2a66e690",
     .nq = 0,
     .nu = 0,
     .np = 0,

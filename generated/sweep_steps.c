@@ -49,14 +49,14 @@ mstmm_generic_effort_kernel *const mstmm_generic_effort_table[] = {
     mstmm_sweep_generic6_effort,
 };
 
-mstmm_generic_exerted_kernel *const mstmm_generic_exerted_table[] = {
+mstmm_generic_required_load_kernel *const mstmm_generic_required_load_table[] = {
     NULL,
-    mstmm_sweep_generic1_exerted,
-    mstmm_sweep_generic2_exerted,
-    mstmm_sweep_generic3_exerted,
-    mstmm_sweep_generic4_exerted,
-    mstmm_sweep_generic5_exerted,
-    mstmm_sweep_generic6_exerted,
+    mstmm_sweep_generic1_required_load,
+    mstmm_sweep_generic2_required_load,
+    mstmm_sweep_generic3_required_load,
+    mstmm_sweep_generic4_required_load,
+    mstmm_sweep_generic5_required_load,
+    mstmm_sweep_generic6_required_load,
 };
 
 mstmm_generic_project_kernel *const mstmm_generic_project_table[] = {
@@ -79,34 +79,34 @@ mstmm_generic_factor_kernel *const mstmm_generic_factor_table[] = {
     mstmm_sweep_generic6_factor,
 };
 
-mstmm_generic_push_kernel *const mstmm_generic_push_table[] = {
-    mstmm_sweep_generic0_push,
-    mstmm_sweep_generic1_push,
-    mstmm_sweep_generic2_push,
-    mstmm_sweep_generic3_push,
-    mstmm_sweep_generic4_push,
-    mstmm_sweep_generic5_push,
-    mstmm_sweep_generic6_push,
+mstmm_generic_column_load_kernel *const mstmm_generic_column_load_table[] = {
+    mstmm_sweep_generic0_column_load,
+    mstmm_sweep_generic1_column_load,
+    mstmm_sweep_generic2_column_load,
+    mstmm_sweep_generic3_column_load,
+    mstmm_sweep_generic4_column_load,
+    mstmm_sweep_generic5_column_load,
+    mstmm_sweep_generic6_column_load,
 };
 
-mstmm_generic_push_on_ground_kernel *const mstmm_generic_push_on_ground_table[] = {
+mstmm_generic_ground_column_load_kernel *const mstmm_generic_ground_column_load_table[] = {
     NULL,
-    mstmm_sweep_generic1_push_on_ground,
-    mstmm_sweep_generic2_push_on_ground,
-    mstmm_sweep_generic3_push_on_ground,
-    mstmm_sweep_generic4_push_on_ground,
-    mstmm_sweep_generic5_push_on_ground,
-    mstmm_sweep_generic6_push_on_ground,
+    mstmm_sweep_generic1_ground_column_load,
+    mstmm_sweep_generic2_ground_column_load,
+    mstmm_sweep_generic3_ground_column_load,
+    mstmm_sweep_generic4_ground_column_load,
+    mstmm_sweep_generic5_ground_column_load,
+    mstmm_sweep_generic6_ground_column_load,
 };
 
-mstmm_generic_answer_kernel *const mstmm_generic_answer_table[] = {
-    mstmm_sweep_generic0_answer,
-    mstmm_sweep_generic1_answer,
-    mstmm_sweep_generic2_answer,
-    mstmm_sweep_generic3_answer,
-    mstmm_sweep_generic4_answer,
-    mstmm_sweep_generic5_answer,
-    mstmm_sweep_generic6_answer,
+mstmm_generic_column_acceleration_kernel *const mstmm_generic_column_acceleration_table[] = {
+    mstmm_sweep_generic0_column_acceleration,
+    mstmm_sweep_generic1_column_acceleration,
+    mstmm_sweep_generic2_column_acceleration,
+    mstmm_sweep_generic3_column_acceleration,
+    mstmm_sweep_generic4_column_acceleration,
+    mstmm_sweep_generic5_column_acceleration,
+    mstmm_sweep_generic6_column_acceleration,
 };
 
 mstmm_generic_qr_eliminate_kernel *const mstmm_generic_qr_eliminate_table[] = {
@@ -149,24 +149,24 @@ mstmm_generic_couple_kernel *const mstmm_generic_couple_table[] = {
     mstmm_sweep_generic6_couple,
 };
 
-mstmm_generic_answered_kernel *const mstmm_generic_answered_table[] = {
+mstmm_generic_add_known_part_kernel *const mstmm_generic_add_known_part_table[] = {
     NULL,
-    mstmm_sweep_generic1_answered,
-    mstmm_sweep_generic2_answered,
-    mstmm_sweep_generic3_answered,
-    mstmm_sweep_generic4_answered,
-    mstmm_sweep_generic5_answered,
-    mstmm_sweep_generic6_answered,
+    mstmm_sweep_generic1_add_known_part,
+    mstmm_sweep_generic2_add_known_part,
+    mstmm_sweep_generic3_add_known_part,
+    mstmm_sweep_generic4_add_known_part,
+    mstmm_sweep_generic5_add_known_part,
+    mstmm_sweep_generic6_add_known_part,
 };
 
-mstmm_generic_pull_kernel *const mstmm_generic_pull_table[] = {
+mstmm_generic_add_multiplier_effort_kernel *const mstmm_generic_add_multiplier_effort_table[] = {
     NULL,
-    mstmm_sweep_generic1_pull,
-    mstmm_sweep_generic2_pull,
-    mstmm_sweep_generic3_pull,
-    mstmm_sweep_generic4_pull,
-    mstmm_sweep_generic5_pull,
-    mstmm_sweep_generic6_pull,
+    mstmm_sweep_generic1_add_multiplier_effort,
+    mstmm_sweep_generic2_add_multiplier_effort,
+    mstmm_sweep_generic3_add_multiplier_effort,
+    mstmm_sweep_generic4_add_multiplier_effort,
+    mstmm_sweep_generic5_add_multiplier_effort,
+    mstmm_sweep_generic6_add_multiplier_effort,
 };
 
 mstmm_generic_forward_slope_kernel *const mstmm_generic_forward_slope_table[] = {
@@ -199,24 +199,24 @@ mstmm_generic_complement_slope_kernel *const mstmm_generic_complement_slope_tabl
     mstmm_sweep_generic6_complement_slope,
 };
 
-mstmm_generic_answered_slope_kernel *const mstmm_generic_answered_slope_table[] = {
+mstmm_generic_add_known_part_slope_kernel *const mstmm_generic_add_known_part_slope_table[] = {
     NULL,
-    mstmm_sweep_generic1_answered_slope,
-    mstmm_sweep_generic2_answered_slope,
-    mstmm_sweep_generic3_answered_slope,
-    mstmm_sweep_generic4_answered_slope,
-    mstmm_sweep_generic5_answered_slope,
-    mstmm_sweep_generic6_answered_slope,
+    mstmm_sweep_generic1_add_known_part_slope,
+    mstmm_sweep_generic2_add_known_part_slope,
+    mstmm_sweep_generic3_add_known_part_slope,
+    mstmm_sweep_generic4_add_known_part_slope,
+    mstmm_sweep_generic5_add_known_part_slope,
+    mstmm_sweep_generic6_add_known_part_slope,
 };
 
-mstmm_generic_pull_slope_kernel *const mstmm_generic_pull_slope_table[] = {
+mstmm_generic_add_multiplier_effort_slope_kernel *const mstmm_generic_add_multiplier_effort_slope_table[] = {
     NULL,
-    mstmm_sweep_generic1_pull_slope,
-    mstmm_sweep_generic2_pull_slope,
-    mstmm_sweep_generic3_pull_slope,
-    mstmm_sweep_generic4_pull_slope,
-    mstmm_sweep_generic5_pull_slope,
-    mstmm_sweep_generic6_pull_slope,
+    mstmm_sweep_generic1_add_multiplier_effort_slope,
+    mstmm_sweep_generic2_add_multiplier_effort_slope,
+    mstmm_sweep_generic3_add_multiplier_effort_slope,
+    mstmm_sweep_generic4_add_multiplier_effort_slope,
+    mstmm_sweep_generic5_add_multiplier_effort_slope,
+    mstmm_sweep_generic6_add_multiplier_effort_slope,
 };
 
 mstmm_generic_tangent_carrier_kernel *const mstmm_generic_tangent_carrier_table[] = {
@@ -239,14 +239,14 @@ mstmm_generic_tangent_column_kernel *const mstmm_generic_tangent_column_table[] 
     mstmm_sweep_generic6_tangent_column,
 };
 
-mstmm_generic_tangent_along_kernel *const mstmm_generic_tangent_along_table[] = {
+mstmm_generic_tangent_coordinate_change_kernel *const mstmm_generic_tangent_coordinate_change_table[] = {
     NULL,
-    mstmm_sweep_generic1_tangent_along,
-    mstmm_sweep_generic2_tangent_along,
-    mstmm_sweep_generic3_tangent_along,
-    mstmm_sweep_generic4_tangent_along,
-    mstmm_sweep_generic5_tangent_along,
-    mstmm_sweep_generic6_tangent_along,
+    mstmm_sweep_generic1_tangent_coordinate_change,
+    mstmm_sweep_generic2_tangent_coordinate_change,
+    mstmm_sweep_generic3_tangent_coordinate_change,
+    mstmm_sweep_generic4_tangent_coordinate_change,
+    mstmm_sweep_generic5_tangent_coordinate_change,
+    mstmm_sweep_generic6_tangent_coordinate_change,
 };
 
 mstmm_generic_tangent_steady_kernel *const mstmm_generic_tangent_steady_table[] = {
@@ -259,14 +259,14 @@ mstmm_generic_tangent_steady_kernel *const mstmm_generic_tangent_steady_table[] 
     mstmm_sweep_generic6_tangent_steady,
 };
 
-mstmm_generic_tangent_turning_kernel *const mstmm_generic_tangent_turning_table[] = {
+mstmm_generic_tangent_rotational_kernel *const mstmm_generic_tangent_rotational_table[] = {
     NULL,
-    mstmm_sweep_generic1_tangent_turning,
-    mstmm_sweep_generic2_tangent_turning,
-    mstmm_sweep_generic3_tangent_turning,
-    mstmm_sweep_generic4_tangent_turning,
-    mstmm_sweep_generic5_tangent_turning,
-    mstmm_sweep_generic6_tangent_turning,
+    mstmm_sweep_generic1_tangent_rotational,
+    mstmm_sweep_generic2_tangent_rotational,
+    mstmm_sweep_generic3_tangent_rotational,
+    mstmm_sweep_generic4_tangent_rotational,
+    mstmm_sweep_generic5_tangent_rotational,
+    mstmm_sweep_generic6_tangent_rotational,
 };
 
 mstmm_generic_tangent_rows_kernel *const mstmm_generic_tangent_rows_table[] = {
@@ -289,44 +289,44 @@ mstmm_generic_tangent_reduce_kernel *const mstmm_generic_tangent_reduce_table[] 
     mstmm_sweep_generic6_tangent_reduce,
 };
 
-mstmm_generic_tangent_push_kernel *const mstmm_generic_tangent_push_table[] = {
+mstmm_generic_tangent_load_kernel *const mstmm_generic_tangent_load_table[] = {
     NULL,
-    mstmm_sweep_generic1_tangent_push,
-    mstmm_sweep_generic2_tangent_push,
-    mstmm_sweep_generic3_tangent_push,
-    mstmm_sweep_generic4_tangent_push,
-    mstmm_sweep_generic5_tangent_push,
-    mstmm_sweep_generic6_tangent_push,
+    mstmm_sweep_generic1_tangent_load,
+    mstmm_sweep_generic2_tangent_load,
+    mstmm_sweep_generic3_tangent_load,
+    mstmm_sweep_generic4_tangent_load,
+    mstmm_sweep_generic5_tangent_load,
+    mstmm_sweep_generic6_tangent_load,
 };
 
-mstmm_generic_tangent_answer_kernel *const mstmm_generic_tangent_answer_table[] = {
+mstmm_generic_tangent_solution_kernel *const mstmm_generic_tangent_solution_table[] = {
     NULL,
-    mstmm_sweep_generic1_tangent_answer,
-    mstmm_sweep_generic2_tangent_answer,
-    mstmm_sweep_generic3_tangent_answer,
-    mstmm_sweep_generic4_tangent_answer,
-    mstmm_sweep_generic5_tangent_answer,
-    mstmm_sweep_generic6_tangent_answer,
+    mstmm_sweep_generic1_tangent_solution,
+    mstmm_sweep_generic2_tangent_solution,
+    mstmm_sweep_generic3_tangent_solution,
+    mstmm_sweep_generic4_tangent_solution,
+    mstmm_sweep_generic5_tangent_solution,
+    mstmm_sweep_generic6_tangent_solution,
 };
 
-mstmm_generic_tangent_push_known_kernel *const mstmm_generic_tangent_push_known_table[] = {
+mstmm_generic_tangent_load_with_increments_kernel *const mstmm_generic_tangent_load_with_increments_table[] = {
     NULL,
-    mstmm_sweep_generic1_tangent_push_known,
-    mstmm_sweep_generic2_tangent_push_known,
-    mstmm_sweep_generic3_tangent_push_known,
-    mstmm_sweep_generic4_tangent_push_known,
-    mstmm_sweep_generic5_tangent_push_known,
-    mstmm_sweep_generic6_tangent_push_known,
+    mstmm_sweep_generic1_tangent_load_with_increments,
+    mstmm_sweep_generic2_tangent_load_with_increments,
+    mstmm_sweep_generic3_tangent_load_with_increments,
+    mstmm_sweep_generic4_tangent_load_with_increments,
+    mstmm_sweep_generic5_tangent_load_with_increments,
+    mstmm_sweep_generic6_tangent_load_with_increments,
 };
 
-mstmm_generic_tangent_answer_known_kernel *const mstmm_generic_tangent_answer_known_table[] = {
+mstmm_generic_tangent_solution_with_increments_kernel *const mstmm_generic_tangent_solution_with_increments_table[] = {
     NULL,
-    mstmm_sweep_generic1_tangent_answer_known,
-    mstmm_sweep_generic2_tangent_answer_known,
-    mstmm_sweep_generic3_tangent_answer_known,
-    mstmm_sweep_generic4_tangent_answer_known,
-    mstmm_sweep_generic5_tangent_answer_known,
-    mstmm_sweep_generic6_tangent_answer_known,
+    mstmm_sweep_generic1_tangent_solution_with_increments,
+    mstmm_sweep_generic2_tangent_solution_with_increments,
+    mstmm_sweep_generic3_tangent_solution_with_increments,
+    mstmm_sweep_generic4_tangent_solution_with_increments,
+    mstmm_sweep_generic5_tangent_solution_with_increments,
+    mstmm_sweep_generic6_tangent_solution_with_increments,
 };
 
 static const real mstmm_directions[18] = {
@@ -344,7 +344,7 @@ int64_t mstmm_bend_numbers(int n) { return (int64_t)89 * n + 4 * (int64_t)n * n;
 int64_t mstmm_port_numbers(int n) { return (int64_t)30 * n + 1 * (int64_t)n * n; }
 
 /* Given accelerations: all, or zero. */
-static int mstmm_at_prescribed(mstmm_state *state, int index)
+static int mstmm_at_prescribed_accelerations(mstmm_state *state, int index)
 {
     const mstmm_body *body = &state->model->bodies[index];
     if (state->given) {
@@ -395,7 +395,7 @@ int mstmm_at_section_motion(mstmm_state *state, int index)
         .Psidd = laid + MSTMM_SECTION_PSIDD(n));
     if (body->section && !body->section->inward) {
         real *block = state->workspace + body->block;
-        code = mstmm_modal_outward(
+        code = mstmm_modal_end_motion(
             .R_end = section->end, .x = laid + MSTMM_SECTION_X(n),
             .Psi = laid + MSTMM_SECTION_PSI(n), .xd = laid + MSTMM_SECTION_XD(n),
             .Psid = laid + MSTMM_SECTION_PSID(n), .xdd = laid + MSTMM_SECTION_XDD(n),
@@ -406,7 +406,7 @@ int mstmm_at_section_motion(mstmm_state *state, int index)
         if (code) return mstmm_fail(state, MSTMM_FAILED_SECTION, index, code);
     } else {
         real *block = state->workspace + body->block;
-        code = mstmm_modal_inward(
+        code = mstmm_modal_frame_motion(
             .R_end = section->end, .x = laid + MSTMM_SECTION_X(n),
             .Psi = laid + MSTMM_SECTION_PSI(n), .xd = laid + MSTMM_SECTION_XD(n),
             .Psid = laid + MSTMM_SECTION_PSID(n), .xdd = laid + MSTMM_SECTION_XDD(n),
@@ -421,7 +421,7 @@ int mstmm_at_section_motion(mstmm_state *state, int index)
         .H = laid + MSTMM_SECTION_H(n));
     if (state->given) {
         real *block = state->workspace + body->block;
-        mstmm_modal_imposed(
+        mstmm_modal_prescribed_bias(
             .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .s = state->given + modal->u,
             .c = block + MSTMM_BLOCK_HINGE_C, .c_s = c);
         memcpy(block + MSTMM_BLOCK_HINGE_C, c, 6 * sizeof(real));
@@ -469,7 +469,7 @@ static int mstmm_at_modal_own(mstmm_state *state, int index)
     for (int j = 0; j < n; j++)
         (state->qdot + modal->q)[j] = (state->u + modal->u)[j];
     if (state->given) {
-        mstmm_modal_prescribed(
+        mstmm_modal_prescribed_load(
             .n = modal->n, .S_rf = modes + MSTMM_MODES_S_RF(n),
             .S_ff = modes + MSTMM_MODES_S_FF(n), .s = state->given + modal->u,
             .e = block + MSTMM_BLOCK_E, .e_f = modes + MSTMM_MODES_E_F(n));
@@ -487,7 +487,7 @@ int mstmm_at_forward(mstmm_state *state, int index, const real *parent_motion)
         code = mstmm_at_section_motion(state, index);
         if (code) return code;
     }
-    if ((body->generic || state->required) && !body->section && !(body->kernels->forward_kept && !body->section && (body->generic || state->required))) {
+    if ((body->generic || state->required) && !body->section && !(body->kernels->body_motion && !body->section && (body->generic || state->required))) {
         code = mstmm_at_hinge_motion(state, index);
         if (code) return code;
     }
@@ -502,10 +502,10 @@ int mstmm_at_forward(mstmm_state *state, int index, const real *parent_motion)
             .motion = block + MSTMM_BLOCK_MOTION, .qdot = state->qdot + body->q);
         if (code) return mstmm_fail(state, MSTMM_FAILED_HINGE, index, code);
     }
-    if (body->kernels->forward_kept && !body->section && (body->generic || state->required)) {
+    if (body->kernels->body_motion && !body->section && (body->generic || state->required)) {
         real *block = state->workspace + body->block;
         const int nu = body->nu;
-        code = mstmm_hinge_forward_kept(body->kernels->forward_kept,
+        code = mstmm_hinge_body_motion(body->kernels->body_motion,
             .p = body->hinge_p, .q = state->q + body->q, .u = state->u + body->u,
             .Rt = body->connection, .ro = body->connection + 9,
             .s = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .motion_I = parent_motion,
@@ -516,7 +516,7 @@ int mstmm_at_forward(mstmm_state *state, int index, const real *parent_motion)
             .r = block + MSTMM_BLOCK_SHIFT, .motion = block + MSTMM_BLOCK_MOTION);
         if (code) return mstmm_fail(state, MSTMM_FAILED_HINGE, index, code);
     }
-    if ((body->generic || state->required) && !(body->kernels->forward_kept && !body->section && (body->generic || state->required))) {
+    if ((body->generic || state->required) && !(body->kernels->body_motion && !body->section && (body->generic || state->required))) {
         real *block = state->workspace + body->block;
         const int nu = body->nu;
         code = mstmm_generic_forward(nu,
@@ -634,8 +634,8 @@ static int mstmm_at_laws(mstmm_state *state, int index)
     return 0;
 }
 
-/* Efforts less those of the rotors at the accelerations of the solution. */
-static int mstmm_at_restated(mstmm_state *state, int index)
+/* Efforts less those of the rotors at the computed accelerations. */
+static int mstmm_at_rotor_residual(mstmm_state *state, int index)
 {
     real lack[1];
     real rotor[1];
@@ -646,7 +646,7 @@ static int mstmm_at_restated(mstmm_state *state, int index)
     if (looped->closure) return 0;
     for (int k = 0; k < body->nu; k++) {
         mstmm_frames_driven_effort(
-            .felt = mstmm_zeros, .J = body->rotor + k,
+            .load = mstmm_zeros, .J = body->rotor + k,
             .udot = mstmm_of_speeds(block, nu, MSTMM_SPEED_S) + k,
             .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k, .tau_d = lack);
         (mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k)[0] = 0;
@@ -656,7 +656,7 @@ static int mstmm_at_restated(mstmm_state *state, int index)
         for (int k = 0; k < body->nu; k++) {
             if (!body->imposed_mask[k]) continue;
             mstmm_frames_driven_effort(
-                .felt = mstmm_zeros, .J = body->rotor + k,
+                .load = mstmm_zeros, .J = body->rotor + k,
                 .udot = mstmm_of_speeds(block, nu, MSTMM_SPEED_S) + k, .tau = mstmm_zeros,
                 .tau_d = rotor);
             (mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k)[0] += rotor[0];
@@ -665,8 +665,8 @@ static int mstmm_at_restated(mstmm_state *state, int index)
     return 0;
 }
 
-/* Efforts less those of the rotors at the accelerations of the solution. */
-static int mstmm_at_restated_of_tree(mstmm_state *state, int index)
+/* Efforts less those of the rotors at the computed accelerations. */
+static int mstmm_at_rotor_residual_of_tree(mstmm_state *state, int index)
 {
     real lack[1];
     real rotor[1];
@@ -675,7 +675,7 @@ static int mstmm_at_restated_of_tree(mstmm_state *state, int index)
     const int nu = body->nu;
     for (int k = 0; k < body->nu; k++) {
         mstmm_frames_driven_effort(
-            .felt = mstmm_zeros, .J = body->rotor + k,
+            .load = mstmm_zeros, .J = body->rotor + k,
             .udot = mstmm_of_speeds(block, nu, MSTMM_SPEED_S) + k,
             .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k, .tau_d = lack);
         (mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k)[0] = 0;
@@ -685,7 +685,7 @@ static int mstmm_at_restated_of_tree(mstmm_state *state, int index)
         for (int k = 0; k < body->nu; k++) {
             if (!body->imposed_mask[k]) continue;
             mstmm_frames_driven_effort(
-                .felt = mstmm_zeros, .J = body->rotor + k,
+                .load = mstmm_zeros, .J = body->rotor + k,
                 .udot = mstmm_of_speeds(block, nu, MSTMM_SPEED_S) + k, .tau = mstmm_zeros,
                 .tau_d = rotor);
             (mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k)[0] += rotor[0];
@@ -753,8 +753,8 @@ static int mstmm_at_drag(mstmm_state *state, int index)
         .Y_z = modal->drag->y[2], .G_x = modal->drag->g[0], .G_y = modal->drag->g[1],
         .G_z = modal->drag->g[2], .M = modal->drag->m, .eta = state->q + modal->q,
         .etad = state->u + modal->u, .v = block + MSTMM_BLOCK_V, .w = block + MSTMM_BLOCK_MOTION,
-        .S = S, .S_rf = modes + MSTMM_MODES_BASED(n), .A = modes + MSTMM_MODES_A_DRAG(n), .h = h,
-        .h_f = modes + MSTMM_MODES_RIGHT(n), .T = T);
+        .S = S, .S_rf = modes + MSTMM_MODES_S_RF_I(n), .A = modes + MSTMM_MODES_A_DRAG(n),
+        .h = h, .h_f = modes + MSTMM_MODES_RIGHT(n), .T = T);
     for (int j = 0; j < 6; j++)
         (block + MSTMM_BLOCK_E)[j] += h[j];
     for (int j = 0; j < n; j++)
@@ -794,7 +794,7 @@ static int mstmm_at_loads(mstmm_state *state, int index)
             .A = on + MSTMM_BLOCK_A, .x = on + MSTMM_BLOCK_X, .v = on + MSTMM_BLOCK_V,
             .motion = on + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros, .offset = load->offset,
             .gravity = mstmm_zeros, .x_K = unused_x_K, .v_K = v, .a_K = unused_a_K);
-        mstmm_frames_turning(
+        mstmm_frames_angular_motion(
             .A = on + MSTMM_BLOCK_A, .motion = on + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros,
             .w_K = w, .alpha_K = unused_alpha_K);
         mstmm_frames_power(
@@ -833,7 +833,7 @@ static int mstmm_at_forces(mstmm_state *state, int index)
         .A = from + MSTMM_BLOCK_A, .x = from + MSTMM_BLOCK_X, .v = from + MSTMM_BLOCK_V,
         .motion = from + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros, .offset = force->offset_f,
         .gravity = mstmm_zeros, .x_K = x_F, .v_K = v_F, .a_K = unused_a_K);
-    mstmm_frames_turning(
+    mstmm_frames_angular_motion(
         .A = from + MSTMM_BLOCK_A, .motion = from + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros,
         .w_K = w_F, .alpha_K = unused_alpha_K);
     mstmm_frames_end_frame(
@@ -842,7 +842,7 @@ static int mstmm_at_forces(mstmm_state *state, int index)
         .A = to + MSTMM_BLOCK_A, .x = to + MSTMM_BLOCK_X, .v = to + MSTMM_BLOCK_V,
         .motion = to + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros, .offset = force->offset_t,
         .gravity = mstmm_zeros, .x_K = x_T, .v_K = v_T, .a_K = unused_a_K);
-    mstmm_frames_turning(
+    mstmm_frames_angular_motion(
         .A = to + MSTMM_BLOCK_A, .motion = to + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros,
         .w_K = w_T, .alpha_K = unused_alpha_K);
     mstmm_frames_end_frame(
@@ -859,7 +859,7 @@ static int mstmm_at_forces(mstmm_state *state, int index)
         .w_F = w_F, .A_T = A_T, .x_T = x_T, .v_T = v_T, .w_T = w_T, .F = F, .M = M, .V = V,
         .P = P);
     if (code) return mstmm_fail(state, MSTMM_FAILED_FORCE, index, code);
-    mstmm_frames_opposite(
+    mstmm_frames_reaction_wrench(
         .x_F = x_F, .x_T = x_T, .F = F, .M = M, .F_back = F_back, .M_back = M_back);
     mstmm_frames_applied_load(
         .A = to + MSTMM_BLOCK_A, .A_F = mstmm_identity, .offset = force->offset_t, .F = F,
@@ -898,11 +898,11 @@ static int mstmm_at_modal_condense(mstmm_state *state, int index)
         mstmm_modal_rebase(
             .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .S = block + MSTMM_BLOCK_S,
             .e = block + MSTMM_BLOCK_E, .S_rf = modes + MSTMM_MODES_S_RF(n),
-            .S_rf_I = modes + MSTMM_MODES_BASED(n), .S_ff = modes + MSTMM_MODES_S_FF(n),
+            .S_rf_I = modes + MSTMM_MODES_S_RF_I(n), .S_ff = modes + MSTMM_MODES_S_FF(n),
             .e_f = modes + MSTMM_MODES_E_F(n));
         code = mstmm_modal_condense(
             .n = modal->n, .S = block + MSTMM_BLOCK_S, .e = block + MSTMM_BLOCK_E,
-            .S_rf = modes + MSTMM_MODES_BASED(n), .S_ff = modes + MSTMM_MODES_S_FF(n),
+            .S_rf = modes + MSTMM_MODES_S_RF_I(n), .S_ff = modes + MSTMM_MODES_S_FF(n),
             .e_f = modes + MSTMM_MODES_E_F(n), .right = modes + MSTMM_MODES_RIGHT(n),
             .Gg = modes + MSTMM_MODES_GAIN(n), .S_c = S_c, .e_c = e_c,
             .work = modes + MSTMM_MODES_WORK(n));
@@ -943,7 +943,7 @@ int mstmm_at_condense(mstmm_state *state, int index)
         real *modes = modal ? state->workspace + modal->place : NULL;
         const mstmm_section *section = body->section;
         real *laid = section ? state->workspace + section->place : NULL;
-        mstmm_modal_absorb(
+        mstmm_modal_assemble_port(
             .n = modal->n, .Rc = block + MSTMM_BLOCK_HINGE_R, .r = block + MSTMM_BLOCK_HINGE_D,
             .H = laid + MSTMM_SECTION_H(n), .S = block + MSTMM_BLOCK_S,
             .e = block + MSTMM_BLOCK_E, .U = laid + MSTMM_SECTION_PUSH(n),
@@ -1039,7 +1039,7 @@ static int mstmm_at_qr_condense(mstmm_state *state, int index)
         memcpy(parent + MSTMM_BLOCK_DELTA, d, 6 * sizeof(real));
     }
     if ((state->observed || state->balance)) {
-        mstmm_qr_restored(
+        mstmm_qr_rows_to_riccati(
             .U = block + MSTMM_BLOCK_S, .d = block + MSTMM_BLOCK_DELTA,
             .e = block + MSTMM_BLOCK_E, .S = S, .e_S = e_S);
         memcpy(block + MSTMM_BLOCK_S, S, 21 * sizeof(real));
@@ -1124,7 +1124,7 @@ int mstmm_at_recover(mstmm_state *state, int index, const real *parent_delta)
         real *modes = modal ? state->workspace + modal->place : NULL;
         const mstmm_section *section = body->section;
         real *laid = section ? state->workspace + section->place : NULL;
-        mstmm_modal_displaced(
+        mstmm_modal_port_deviation(
             .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .etadd = modes + MSTMM_MODES_ETADD(n),
             .delta_I = block + MSTMM_BLOCK_DELTA, .delta = delta);
         memcpy(block + MSTMM_BLOCK_DELTA, delta, 6 * sizeof(real));
@@ -1153,7 +1153,7 @@ static int mstmm_at_closures(mstmm_state *state, int index)
             .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H), .W = closed + MSTMM_CLOSURE_W);
         if (code) return mstmm_fail(state, MSTMM_FAILED_HINGE, index, code);
     }
-    mstmm_loops_meet(
+    mstmm_loops_relative_pose(
         .A_C = block + MSTMM_BLOCK_A, .x_C = block + MSTMM_BLOCK_X,
         .A_B = outboard + MSTMM_BLOCK_A, .x_B = outboard + MSTMM_BLOCK_X, .r_e = closure->end,
         .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
@@ -1191,21 +1191,21 @@ static int mstmm_at_closures(mstmm_state *state, int index)
         if (code) return mstmm_fail(state, MSTMM_FAILED_FLAT, index, code);
     }
     if (state->level == MSTMM_GAP) {
-        mstmm_loops_known(
+        mstmm_loops_known_parts(
             .W = closed + MSTMM_CLOSURE_W, .relative = closed + MSTMM_CLOSURE_GAP,
             .l = closed + MSTMM_CLOSURE_L);
     }
     if (state->level == MSTMM_SLIP) {
-        mstmm_loops_known(
+        mstmm_loops_known_parts(
             .W = closed + MSTMM_CLOSURE_W, .relative = closed + MSTMM_CLOSURE_SLIP,
             .l = closed + MSTMM_CLOSURE_L);
     }
     if (state->refined) {
         for (int c = 0; c < looped->n_own; c++) {
             const mstmm_own *own = &looped->own[c];
-            mstmm_generic_pull(nu,
+            mstmm_generic_add_multiplier_effort(nu,
                 .y = loops + own->tau,
-                .x = loops + MSTMM_ROW * (int64_t)own->row + MSTMM_ROW_TOLD,
+                .x = loops + MSTMM_ROW * (int64_t)own->row + MSTMM_ROW_PREVIOUS_X,
                 .y_0 = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU));
         }
     }
@@ -1226,13 +1226,13 @@ static int mstmm_at_closures(mstmm_state *state, int index)
             .slip = closed + MSTMM_CLOSURE_SLIP, .drift = drift);
     }
     if (!state->level && !(state->closing > 0)) {
-        mstmm_loops_known(
+        mstmm_loops_known_parts(
             .W = closed + MSTMM_CLOSURE_W, .relative = drift, .l = closed + MSTMM_CLOSURE_L);
     }
     if ((state->closing > 0)) {
-        mstmm_loops_closing(
+        mstmm_loops_required_acceleration(
             .gap = closed + MSTMM_CLOSURE_GAP, .rate = &state->closing, .relative = relative);
-        mstmm_loops_known(
+        mstmm_loops_known_parts(
             .W = closed + MSTMM_CLOSURE_W, .relative = relative, .l = closed + MSTMM_CLOSURE_L);
     }
     for (int k = 0; k < body->nu; k++) {
@@ -1241,10 +1241,10 @@ static int mstmm_at_closures(mstmm_state *state, int index)
             .r_e = closure->end, .Rc = block + MSTMM_BLOCK_R,
             .r_A = closed + MSTMM_CLOSURE_LEVER, .J_A = closed + MSTMM_CLOSURE_J_A + 6 * k,
             .J_B = closed + MSTMM_CLOSURE_J_B + 6 * k);
-        mstmm_loops_act(
+        mstmm_loops_apply_effort(
             .J = closed + MSTMM_CLOSURE_J_A + 6 * k,
             .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k, .e = parent + MSTMM_BLOCK_E);
-        mstmm_loops_act(
+        mstmm_loops_apply_effort(
             .J = closed + MSTMM_CLOSURE_J_B + 6 * k,
             .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k,
             .e = outboard + MSTMM_BLOCK_E);
@@ -1263,39 +1263,39 @@ static int mstmm_at_closures(mstmm_state *state, int index)
             (loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_KNOWN)[0] = 0;
         }
         if (state->refined) {
-            mstmm_loops_loaded(
+            mstmm_loops_apply_multiplier(
                 .K = closed + MSTMM_CLOSURE_J_A + 6 * c,
-                .x = loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_TOLD,
+                .x = loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_PREVIOUS_X,
                 .e = parent + MSTMM_BLOCK_E);
         }
         if (state->refined) {
-            mstmm_loops_loaded(
+            mstmm_loops_apply_multiplier(
                 .K = closed + MSTMM_CLOSURE_J_B + 6 * c,
-                .x = loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_TOLD,
+                .x = loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_PREVIOUS_X,
                 .e = outboard + MSTMM_BLOCK_E);
         }
         if (state->refined && (state->model->rows[closure->rows[c]].softness > 0)) {
-            mstmm_loops_yielded(
+            mstmm_loops_rotor_row_residual(
                 .softness = &state->model->rows[closure->rows[c]].softness,
                 .s = mstmm_of_speeds(block, nu, MSTMM_SPEED_S) + c,
-                .x = loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_TOLD,
+                .x = loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_PREVIOUS_X,
                 .l = loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_KNOWN);
         }
     }
     for (int c = 0; c < looped->n_own; c++) {
         const mstmm_own *own = &looped->own[c];
         for (int k = 0; k < body->nu; k++) {
-            mstmm_loops_act(
+            mstmm_loops_apply_effort(
                 .J = closed + MSTMM_CLOSURE_J_A + 6 * k, .tau = loops + own->tau + k,
                 .e = loops + own->inner);
-            mstmm_loops_act(
+            mstmm_loops_apply_effort(
                 .J = closed + MSTMM_CLOSURE_J_B + 6 * k, .tau = loops + own->tau + k,
                 .e = loops + own->outer);
         }
-        mstmm_generic_answered(nu,
+        mstmm_generic_add_known_part(nu,
             .y = closed + MSTMM_CLOSURE_L, .z = loops + own->tau,
             .l = loops + MSTMM_ROW * (int64_t)own->row + MSTMM_ROW_KNOWN);
-        mstmm_generic_answered(nu,
+        mstmm_generic_add_known_part(nu,
             .y = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .z = loops + own->tau,
             .l = loops + MSTMM_ROW * (int64_t)own->row + MSTMM_ROW_KNOWN);
     }
@@ -1303,17 +1303,17 @@ static int mstmm_at_closures(mstmm_state *state, int index)
 }
 
 /* A row eliminated on the body where its ends meet. */
-static int mstmm_at_row_closed(mstmm_state *state, int index)
+static int mstmm_at_row_elimination(mstmm_state *state, int index)
 {
     real *loops = state->workspace + state->model->loops;
     const mstmm_loop_row *row = &state->model->rows[index];
     real *line = loops + MSTMM_ROW * (int64_t)index;
-    mstmm_loops_settle(
+    mstmm_loops_pivot_inverse(
         .L = line + MSTMM_ROW_PIVOT, .floor_ = mstmm_row_floor(state, row),
         .inverse = line + MSTMM_ROW_INVERSE);
     if ((row->body >= 0)) {
         real *meeting = mstmm_block(state->model, state->workspace, row->body);
-        mstmm_loops_close(
+        mstmm_loops_eliminate_row(
             .inverse = line + MSTMM_ROW_INVERSE, .K = line + MSTMM_ROW_K,
             .l = line + MSTMM_ROW_KNOWN, .S = meeting + MSTMM_BLOCK_S,
             .e = meeting + MSTMM_BLOCK_E);
@@ -1321,16 +1321,16 @@ static int mstmm_at_row_closed(mstmm_state *state, int index)
     for (int c = 0; c < row->n_others; c++) {
         const mstmm_other *other = &row->others[c];
         if ((row->body >= 0)) {
-            mstmm_loops_shed(
+            mstmm_loops_update_column(
                 .inverse = line + MSTMM_ROW_INVERSE, .K = line + MSTMM_ROW_K,
                 .L_p = loops + other->pair, .K_p = loops + other->column);
         }
-        mstmm_loops_shed_known(
+        mstmm_loops_update_known_part(
             .inverse = line + MSTMM_ROW_INVERSE, .l = line + MSTMM_ROW_KNOWN,
             .L_p = loops + other->pair,
             .l_p = loops + MSTMM_ROW * (int64_t)other->row + MSTMM_ROW_KNOWN);
         for (int b = 0; b <= c; b++) {
-            mstmm_loops_shed_pair(
+            mstmm_loops_update_coupling(
                 .inverse = line + MSTMM_ROW_INVERSE, .L_p = loops + other->pair,
                 .L_q = loops + row->others[b].pair, .L_pq = loops + other->pairs[b]);
         }
@@ -1338,8 +1338,8 @@ static int mstmm_at_row_closed(mstmm_state *state, int index)
     return 0;
 }
 
-/* S, e and the columns of open rows carried across the hinge to the parent. */
-static int mstmm_at_carried(mstmm_state *state, int index)
+/* S, e and columns of open rows carried to the parent. */
+static int mstmm_at_condense_with_rows(mstmm_state *state, int index)
 {
     real hinge_J_free[6];
     real hinge_tau_free[6];
@@ -1358,7 +1358,7 @@ static int mstmm_at_carried(mstmm_state *state, int index)
     int columns[6];
     const int speeds = mstmm_free_speeds(state->memory, body, columns);
     int code;
-    if (mstmm_aside(state->model, state->observed, index)) return 0;
+    if (mstmm_omitted(state->model, state->observed, index)) return 0;
     if (body->modal) {
         real *modes = modal ? state->workspace + modal->place : NULL;
         code = mstmm_at_modal_condense(state, index);
@@ -1366,30 +1366,30 @@ static int mstmm_at_carried(mstmm_state *state, int index)
         for (int c = 0; c < looped->n_bent; c++) {
             const mstmm_pending *bent = &looped->bent[c];
             if (body->section) {
-                mstmm_modal_row_felt(
+                mstmm_modal_modal_column(
                     .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .K = loops + bent->column,
                     .K_f = loops + bent->modes);
             }
-            mstmm_modal_row_condensed(
+            mstmm_modal_condense_row(
                 .n = modal->n, .S_ff = modes + MSTMM_MODES_S_FF(n), .K_f = loops + bent->modes,
                 .Gg = modes + MSTMM_MODES_GAIN(n), .Y = loops + bent->y,
                 .K = loops + bent->column,
                 .l_ = loops + MSTMM_ROW * (int64_t)bent->row + MSTMM_ROW_KNOWN,
                 .work = modes + MSTMM_MODES_WORK(n));
             for (int b = 0; b <= c; b++) {
-                mstmm_modal_row_coupled(
+                mstmm_modal_row_coupling(
                     .n = modal->n, .K_f = loops + looped->bent[b].modes, .Y = loops + bent->y,
                     .L_ij = loops + bent->pairs[b]);
             }
         }
     }
     for (int r = looped->first_row; r < looped->first_row + looped->n_rows; r++) {
-        code = mstmm_at_row_closed(state, r);
+        code = mstmm_at_row_elimination(state, r);
         if (code) return code;
     }
     if (body->section && !body->section->inward) {
         real *modes = modal ? state->workspace + modal->place : NULL;
-        mstmm_modal_absorb(
+        mstmm_modal_assemble_port(
             .n = modal->n, .Rc = block + MSTMM_BLOCK_HINGE_R, .r = block + MSTMM_BLOCK_HINGE_D,
             .H = laid + MSTMM_SECTION_H(n), .S = block + MSTMM_BLOCK_S,
             .e = block + MSTMM_BLOCK_E, .U = laid + MSTMM_SECTION_PUSH(n),
@@ -1405,9 +1405,9 @@ static int mstmm_at_carried(mstmm_state *state, int index)
         for (int c = 0; c < looped->n_pending; c++) {
             const mstmm_pending *pending = &looped->pending[c];
             if ((pending->tau >= 0)) {
-                mstmm_generic_pull(nu,
+                mstmm_generic_add_multiplier_effort(nu,
                     .y = loops + pending->tau,
-                    .x = loops + MSTMM_ROW * (int64_t)pending->row + MSTMM_ROW_TOLD,
+                    .x = loops + MSTMM_ROW * (int64_t)pending->row + MSTMM_ROW_PREVIOUS_X,
                     .y_0 = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU));
             }
         }
@@ -1422,7 +1422,7 @@ static int mstmm_at_carried(mstmm_state *state, int index)
         .G = mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN), .S_I = parent + MSTMM_BLOCK_S);
     if (code) return mstmm_fail(state, MSTMM_FAILED_UNDETERMINED, index, code);
     if ((body->parent >= 0)) {
-        mstmm_generic_push(speeds,
+        mstmm_generic_column_load(speeds,
             .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
             .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE),
             .G = mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN), .e = block + MSTMM_BLOCK_E,
@@ -1430,26 +1430,26 @@ static int mstmm_at_carried(mstmm_state *state, int index)
             .e_I = parent + MSTMM_BLOCK_E);
     }
     if (!body->section && speeds && !(body->parent >= 0)) {
-        mstmm_generic_push_on_ground(speeds,
+        mstmm_generic_ground_column_load(speeds,
             .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE), .e = block + MSTMM_BLOCK_E,
             .tau = hinge_tau_free, .y = mstmm_of_speeds(block, nu, MSTMM_SPEED_OFFSET));
     }
     for (int c = 0; c < looped->n_pending; c++) {
         const mstmm_pending *pending = &looped->pending[c];
         if (body->section && !body->section->inward) {
-            mstmm_modal_row_felt(
+            mstmm_modal_modal_column(
                 .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .K = loops + pending->column,
                 .K_f = loops + pending->modes);
         }
         if (!(pending->tau >= 0) && (body->parent >= 0)) {
-            mstmm_generic_push(speeds,
+            mstmm_generic_column_load(speeds,
                 .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
                 .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE),
                 .G = mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN), .e = loops + pending->column,
                 .tau = mstmm_zeros, .y = loops + pending->y, .e_I = loops + pending->onward);
         }
         if (!(pending->tau >= 0) && !body->section && speeds && !(body->parent >= 0)) {
-            mstmm_generic_push_on_ground(speeds,
+            mstmm_generic_ground_column_load(speeds,
                 .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE),
                 .e = loops + pending->column, .tau = mstmm_zeros, .y = loops + pending->y);
         }
@@ -1458,19 +1458,19 @@ static int mstmm_at_carried(mstmm_state *state, int index)
                 tau[k] = (loops + pending->tau)[columns[k]];
         }
         if ((pending->tau >= 0) && (body->parent >= 0)) {
-            mstmm_generic_push(speeds,
+            mstmm_generic_column_load(speeds,
                 .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
                 .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE),
                 .G = mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN), .e = loops + pending->column,
                 .tau = tau, .y = loops + pending->y, .e_I = loops + pending->onward);
         }
         if ((pending->tau >= 0) && !body->section && speeds && !(body->parent >= 0)) {
-            mstmm_generic_push_on_ground(speeds,
+            mstmm_generic_ground_column_load(speeds,
                 .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE),
                 .e = loops + pending->column, .tau = tau, .y = loops + pending->y);
         }
         if ((pending->tau >= 0)) {
-            mstmm_generic_answered(nu,
+            mstmm_generic_add_known_part(nu,
                 .y = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .z = loops + pending->tau,
                 .l = loops + MSTMM_ROW * (int64_t)pending->row + MSTMM_ROW_KNOWN);
         }
@@ -1479,7 +1479,7 @@ static int mstmm_at_carried(mstmm_state *state, int index)
                 .F = mstmm_of_speeds(block, nu, MSTMM_SPEED_H), .y = loops + pending->y, .z = z);
         }
         if (!body->section && speeds) {
-            mstmm_generic_answered(speeds,
+            mstmm_generic_add_known_part(speeds,
                 .y = mstmm_of_speeds(block, nu, MSTMM_SPEED_OFFSET), .z = z,
                 .l = loops + MSTMM_ROW * (int64_t)pending->row + MSTMM_ROW_KNOWN);
         }
@@ -1493,8 +1493,8 @@ static int mstmm_at_carried(mstmm_state *state, int index)
     return 0;
 }
 
-/* The multiplier of a row, from the motion of the body where it closes. */
-static int mstmm_at_row_found(mstmm_state *state, int index)
+/* Multiplier of a row, from the motion of the body where it closes. */
+static int mstmm_at_row_multiplier(mstmm_state *state, int index)
 {
     real *loops = state->workspace + state->model->loops;
     const mstmm_loop_row *row = &state->model->rows[index];
@@ -1504,13 +1504,13 @@ static int mstmm_at_row_found(mstmm_state *state, int index)
         .x = line + MSTMM_ROW_X);
     if ((row->body >= 0)) {
         real *meeting = mstmm_block(state->model, state->workspace, row->body);
-        mstmm_loops_multiplier_more(
+        mstmm_loops_multiplier_of_motion(
             .inverse = line + MSTMM_ROW_INVERSE, .K = line + MSTMM_ROW_K,
             .delta = meeting + MSTMM_BLOCK_DELTA, .x = line + MSTMM_ROW_X);
     }
     for (int c = 0; c < row->n_others; c++) {
         const mstmm_other *other = &row->others[c];
-        mstmm_loops_multiplier_less(
+        mstmm_loops_multiplier_of_row(
             .inverse = line + MSTMM_ROW_INVERSE, .L_p = loops + other->pair,
             .x_p = loops + MSTMM_ROW * (int64_t)other->row + MSTMM_ROW_X,
             .x = line + MSTMM_ROW_X);
@@ -1519,7 +1519,7 @@ static int mstmm_at_row_found(mstmm_state *state, int index)
 }
 
 /* Accelerations of a hinge under the multipliers of its open rows. */
-static int mstmm_at_answered(mstmm_state *state, int index)
+static int mstmm_at_recover_with_rows(mstmm_state *state, int index)
 {
     real delta[6];
     const mstmm_body *body = &state->model->bodies[index];
@@ -1531,23 +1531,23 @@ static int mstmm_at_answered(mstmm_state *state, int index)
     int columns[6];
     const int speeds = mstmm_free_speeds(state->memory, body, columns);
     int code;
-    if (mstmm_aside(state->model, state->observed, index)) return 0;
+    if (mstmm_omitted(state->model, state->observed, index)) return 0;
     for (int c = 0; c < looped->n_pending; c++) {
         const mstmm_pending *pending = &looped->pending[c];
         if (!body->section && speeds) {
-            mstmm_generic_pull(speeds,
+            mstmm_generic_add_multiplier_effort(speeds,
                 .y = loops + pending->y,
                 .x = loops + MSTMM_ROW * (int64_t)pending->row + MSTMM_ROW_X,
                 .y_0 = mstmm_of_speeds(block, nu, MSTMM_SPEED_OFFSET));
         }
         if ((state->observed || state->balance)) {
-            mstmm_loops_loaded(
+            mstmm_loops_apply_multiplier(
                 .K = loops + pending->column,
                 .x = loops + MSTMM_ROW * (int64_t)pending->row + MSTMM_ROW_X,
                 .e = block + MSTMM_BLOCK_E);
         }
     }
-    mstmm_generic_answer(speeds,
+    mstmm_generic_column_acceleration(speeds,
         .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
         .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE),
         .F = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
@@ -1560,7 +1560,7 @@ static int mstmm_at_answered(mstmm_state *state, int index)
         for (int c = 0; c < looped->n_pending; c++) {
             const mstmm_pending *pending = &looped->pending[c];
             if ((pending->tau >= 0)) {
-                mstmm_generic_pull(nu,
+                mstmm_generic_add_multiplier_effort(nu,
                     .y = loops + pending->tau,
                     .x = loops + MSTMM_ROW * (int64_t)pending->row + MSTMM_ROW_X,
                     .y_0 = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU));
@@ -1579,7 +1579,7 @@ static int mstmm_at_answered(mstmm_state *state, int index)
             (state->udot + body->u)[j] += (mstmm_of_speeds(block, nu, MSTMM_SPEED_S))[j];
     }
     for (int r = looped->first_row + looped->n_rows - 1; r >= looped->first_row; r--) {
-        code = mstmm_at_row_found(state, r);
+        code = mstmm_at_row_multiplier(state, r);
         if (code) return code;
     }
     if (body->modal) {
@@ -1591,7 +1591,7 @@ static int mstmm_at_answered(mstmm_state *state, int index)
             .delta_I = block + MSTMM_BLOCK_DELTA, .etadd = modes + MSTMM_MODES_ETADD(n));
         for (int c = 0; c < looped->n_bent; c++) {
             const mstmm_pending *bent = &looped->bent[c];
-            mstmm_modal_row_answered(
+            mstmm_modal_multiplier_acceleration(
                 .n = modal->n, .Y = loops + bent->y,
                 .x = loops + MSTMM_ROW * (int64_t)bent->row + MSTMM_ROW_X,
                 .etadd = modes + MSTMM_MODES_ETADD(n));
@@ -1611,7 +1611,7 @@ static int mstmm_at_answered(mstmm_state *state, int index)
         real *modes = modal ? state->workspace + modal->place : NULL;
         const mstmm_section *section = body->section;
         real *laid = section ? state->workspace + section->place : NULL;
-        mstmm_modal_displaced(
+        mstmm_modal_port_deviation(
             .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .etadd = modes + MSTMM_MODES_ETADD(n),
             .delta_I = block + MSTMM_BLOCK_DELTA, .delta = delta);
         memcpy(block + MSTMM_BLOCK_DELTA, delta, 6 * sizeof(real));
@@ -1624,7 +1624,7 @@ static int mstmm_at_answered(mstmm_state *state, int index)
 }
 
 /* Accelerations and load of a cut hinge. */
-static int mstmm_at_closures_answered(mstmm_state *state, int index)
+static int mstmm_at_closure_accelerations(mstmm_state *state, int index)
 {
     real along[1];
     const mstmm_body *body = &state->model->bodies[index];
@@ -1639,7 +1639,7 @@ static int mstmm_at_closures_answered(mstmm_state *state, int index)
     if (!looped->closure) return 0;
     mstmm_set(state->udot + body->u, mstmm_of_speeds(block, nu, MSTMM_SPEED_S), nu);
     for (int k = 0; k < body->nu; k++) {
-        mstmm_loops_told(
+        mstmm_loops_row_acceleration(
             .J_A = closed + MSTMM_CLOSURE_J_A + 6 * k, .J_B = closed + MSTMM_CLOSURE_J_B + 6 * k,
             .l = closed + MSTMM_CLOSURE_L + k, .delta_A = parent + MSTMM_BLOCK_DELTA,
             .delta_B = outboard + MSTMM_BLOCK_DELTA, .c = along);
@@ -1648,25 +1648,25 @@ static int mstmm_at_closures_answered(mstmm_state *state, int index)
     if (state->refined) {
         for (int c = 0; c < 6; c++) {
             if (closure->rows[c] < 0) continue;
-            (loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_X)[0] += (loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_TOLD)[0];
+            (loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_X)[0] += (loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_PREVIOUS_X)[0];
         }
     }
     if ((state->observed || state->balance)) {
         for (int c = 0; c < looped->n_own; c++) {
             const mstmm_own *own = &looped->own[c];
-            mstmm_generic_pull(nu,
+            mstmm_generic_add_multiplier_effort(nu,
                 .y = loops + own->tau, .x = loops + MSTMM_ROW * (int64_t)own->row + MSTMM_ROW_X,
                 .y_0 = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU));
         }
         memset(block + MSTMM_BLOCK_E, 0, 6 * sizeof(real));
         for (int k = 0; k < body->nu; k++) {
-            mstmm_loops_loaded(
+            mstmm_loops_apply_multiplier(
                 .K = closed + MSTMM_CLOSURE_W + 6 * k,
                 .x = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k, .e = block + MSTMM_BLOCK_E);
         }
         for (int c = 0; c < 6; c++) {
             if (closure->rows[c] < 0) continue;
-            mstmm_loops_act(
+            mstmm_loops_apply_effort(
                 .J = closed + MSTMM_CLOSURE_W + 6 * c,
                 .tau = loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_X,
                 .e = block + MSTMM_BLOCK_E);
@@ -1697,7 +1697,7 @@ static int mstmm_at_drive_power(mstmm_state *state, int index)
     for (int k = 0; k < body->nu; k++) {
         if (!body->imposed_mask[k]) continue;
         mstmm_frames_driven_effort(
-            .felt = tau + k, .J = body->rotor + k, .udot = state->udot + body->u + k,
+            .load = tau + k, .J = body->rotor + k, .udot = state->udot + body->u + k,
             .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k, .tau_d = driven);
         mstmm_frames_speed_power(
             .tau = driven, .u = state->u + body->u + k, .P = P);
@@ -1707,20 +1707,20 @@ static int mstmm_at_drive_power(mstmm_state *state, int index)
 }
 
 /* Multipliers of couplings, and the power supplied by time-dependent couplings. */
-static int mstmm_at_couplings_answered(mstmm_state *state, int index)
+static int mstmm_at_coupling_multipliers(mstmm_state *state, int index)
 {
     real P[1];
     const mstmm_coupling *coupling = &state->model->couplings[index];
     if ((coupling->row < 0)) return 0;
     if (state->refined) {
         real *loops = state->workspace + state->model->loops;
-        (loops + MSTMM_ROW * (int64_t)coupling->row + MSTMM_ROW_X)[0] += (loops + MSTMM_ROW * (int64_t)coupling->row + MSTMM_ROW_TOLD)[0];
+        (loops + MSTMM_ROW * (int64_t)coupling->row + MSTMM_ROW_X)[0] += (loops + MSTMM_ROW * (int64_t)coupling->row + MSTMM_ROW_PREVIOUS_X)[0];
     }
     if (state->balance) {
         real *loops = state->workspace + state->model->loops;
         mstmm_frames_speed_power(
             .tau = loops + MSTMM_ROW * (int64_t)coupling->row + MSTMM_ROW_X,
-            .u = loops + coupling->numbers + MSTMM_COUPLING_STILL, .P = P);
+            .u = loops + coupling->numbers + MSTMM_COUPLING_TIME_RATE, .P = P);
         state->balance->power += P[0];
     }
     return 0;
@@ -1740,7 +1740,7 @@ static int mstmm_at_forward_in_plane(mstmm_state *state, int index)
         .motion_I = parent + MSTMM_FLAT_MOTION, .Rc = block + MSTMM_FLAT_R,
         .motion = block + MSTMM_FLAT_MOTION, .qdot = state->qdot + body->q);
     if (code) return mstmm_fail(state, MSTMM_FAILED_HINGE, index, code);
-    if (!body->aside) {
+    if (!body->omitted) {
         mstmm_planar_inertia(
             .p = body->given + MSTMM_GIVEN_P, .S = block + MSTMM_FLAT_S);
         mstmm_planar_bias_load(
@@ -1827,7 +1827,7 @@ static int mstmm_at_closures_in_plane(mstmm_state *state, int index)
     real *parent = mstmm_flat_block(state, body->parent);
     real *outboard = mstmm_flat_block(state, closure->outboard);
     real *loops = state->workspace + state->model->loops;
-    mstmm_planar_meet(
+    mstmm_planar_relative_pose(
         .A_C = block + MSTMM_FLAT_A, .x_C = block + MSTMM_FLAT_X, .A_B = outboard + MSTMM_FLAT_A,
         .x_B = outboard + MSTMM_FLAT_X, .r_e = closure->end, .Rc = block + MSTMM_FLAT_R,
         .r = body->given + MSTMM_GIVEN_SHIFT, .R_C = R_C, .r_A = lever, .d = d);
@@ -1839,14 +1839,14 @@ static int mstmm_at_closures_in_plane(mstmm_state *state, int index)
         .R_C = R_C, .r_e = closure->end, .d = d, .slip = slip,
         .motion_C = block + MSTMM_FLAT_MOTION, .motion_B = outboard + MSTMM_FLAT_MOTION,
         .drift = drift);
-    mstmm_planar_known(
+    mstmm_planar_known_parts(
         .W = mstmm_directions, .relative = drift, .l = block + MSTMM_FLAT_DELTA);
     mstmm_planar_row(
         .w = mstmm_directions, .R_C = R_C, .r_e = closure->end, .Rc = block + MSTMM_FLAT_R,
         .r_A = lever, .J_A = block + MSTMM_FLAT_S, .J_B = block + MSTMM_FLAT_S + 3);
-    mstmm_planar_act(
+    mstmm_planar_apply_effort(
         .J = block + MSTMM_FLAT_S, .tau = block + MSTMM_FLAT_TAU, .e = parent + MSTMM_FLAT_E);
-    mstmm_planar_act(
+    mstmm_planar_apply_effort(
         .J = block + MSTMM_FLAT_S + 3, .tau = block + MSTMM_FLAT_TAU,
         .e = outboard + MSTMM_FLAT_E);
     for (int c = 0; c < 6; c++) {
@@ -1907,14 +1907,14 @@ static int mstmm_at_forces_in_plane(mstmm_state *state, int index)
     mstmm_planar_point(
         .A = from + MSTMM_FLAT_A, .x = from + MSTMM_FLAT_X, .v = from + MSTMM_FLAT_V,
         .motion = from + MSTMM_FLAT_MOTION, .offset = force->offset_f, .x_K = x_F, .v_K = v_F);
-    mstmm_planar_turning(
+    mstmm_planar_angular_motion(
         .A = from + MSTMM_FLAT_A, .motion = from + MSTMM_FLAT_MOTION, .w_K = w_F);
     mstmm_planar_end_frame(
         .A = from + MSTMM_FLAT_A, .R_end = force->axes_f, .A_end = A_F);
     mstmm_planar_point(
         .A = to + MSTMM_FLAT_A, .x = to + MSTMM_FLAT_X, .v = to + MSTMM_FLAT_V,
         .motion = to + MSTMM_FLAT_MOTION, .offset = force->offset_t, .x_K = x_T, .v_K = v_T);
-    mstmm_planar_turning(
+    mstmm_planar_angular_motion(
         .A = to + MSTMM_FLAT_A, .motion = to + MSTMM_FLAT_MOTION, .w_K = w_T);
     mstmm_planar_end_frame(
         .A = to + MSTMM_FLAT_A, .R_end = force->axes_t, .A_end = A_T);
@@ -1930,7 +1930,7 @@ static int mstmm_at_forces_in_plane(mstmm_state *state, int index)
         .w_F = w_F, .A_T = A_T, .x_T = x_T, .v_T = v_T, .w_T = w_T, .F = F, .M = M, .V = V,
         .P = P);
     if (code) return mstmm_fail(state, MSTMM_FAILED_FORCE, index, code);
-    mstmm_frames_opposite(
+    mstmm_frames_reaction_wrench(
         .x_F = x_F, .x_T = x_T, .F = F, .M = M, .F_back = F_back, .M_back = M_back);
     mstmm_planar_applied_load(
         .A = to + MSTMM_FLAT_A, .A_F = mstmm_identity, .offset = force->offset_t, .F = F, .M = M,
@@ -1942,17 +1942,17 @@ static int mstmm_at_forces_in_plane(mstmm_state *state, int index)
 }
 
 /* A row eliminated on the body where its ends meet. */
-static int mstmm_at_row_closed_in_plane(mstmm_state *state, int index)
+static int mstmm_at_row_elimination_in_plane(mstmm_state *state, int index)
 {
     real *loops = state->workspace + state->model->loops;
     const mstmm_loop_row *row = &state->model->rows[index];
     real *line = loops + MSTMM_ROW * (int64_t)index;
-    mstmm_loops_settle(
+    mstmm_loops_pivot_inverse(
         .L = line + MSTMM_ROW_PIVOT, .floor_ = mstmm_row_floor(state, row),
         .inverse = line + MSTMM_ROW_INVERSE);
     if ((row->body >= 0)) {
         real *meeting = mstmm_flat_block(state, row->body);
-        mstmm_planar_close(
+        mstmm_planar_eliminate_row(
             .inverse = line + MSTMM_ROW_INVERSE, .K = line + MSTMM_ROW_K,
             .l = line + MSTMM_ROW_KNOWN, .S = meeting + MSTMM_FLAT_S,
             .e = meeting + MSTMM_FLAT_E);
@@ -1960,16 +1960,16 @@ static int mstmm_at_row_closed_in_plane(mstmm_state *state, int index)
     for (int c = 0; c < row->n_others; c++) {
         const mstmm_other *other = &row->others[c];
         if ((row->body >= 0)) {
-            mstmm_planar_shed(
+            mstmm_planar_update_column(
                 .inverse = line + MSTMM_ROW_INVERSE, .K = line + MSTMM_ROW_K,
                 .L_p = loops + other->pair, .K_p = loops + other->column);
         }
-        mstmm_loops_shed_known(
+        mstmm_loops_update_known_part(
             .inverse = line + MSTMM_ROW_INVERSE, .l = line + MSTMM_ROW_KNOWN,
             .L_p = loops + other->pair,
             .l_p = loops + MSTMM_ROW * (int64_t)other->row + MSTMM_ROW_KNOWN);
         for (int b = 0; b <= c; b++) {
-            mstmm_loops_shed_pair(
+            mstmm_loops_update_coupling(
                 .inverse = line + MSTMM_ROW_INVERSE, .L_p = loops + other->pair,
                 .L_q = loops + row->others[b].pair, .L_pq = loops + other->pairs[b]);
         }
@@ -1977,8 +1977,8 @@ static int mstmm_at_row_closed_in_plane(mstmm_state *state, int index)
     return 0;
 }
 
-/* S, e and the columns of open rows carried across the hinge to the parent. */
-static int mstmm_at_carried_in_plane(mstmm_state *state, int index)
+/* S, e and columns of open rows carried to the parent. */
+static int mstmm_at_condense_with_rows_in_plane(mstmm_state *state, int index)
 {
     real z[1];
     const mstmm_flat_body *body = &state->model->flat[index];
@@ -1987,9 +1987,9 @@ static int mstmm_at_carried_in_plane(mstmm_state *state, int index)
     const mstmm_flat_body *looped = body;
     real *loops = state->workspace + state->model->loops;
     int code;
-    if (body->aside) return 0;
+    if (body->omitted) return 0;
     for (int r = looped->first_row; r < looped->first_row + looped->n_rows; r++) {
-        code = mstmm_at_row_closed_in_plane(state, r);
+        code = mstmm_at_row_elimination_in_plane(state, r);
         if (code) return code;
     }
     code = mstmm_planar_factor(
@@ -1999,31 +1999,31 @@ static int mstmm_at_carried_in_plane(mstmm_state *state, int index)
         .S_I = parent + MSTMM_FLAT_S);
     if (code) return mstmm_fail(state, MSTMM_FAILED_UNDETERMINED, index, code);
     if ((body->parent >= 0)) {
-        mstmm_planar_push(
+        mstmm_planar_column_load(
             .Rc = block + MSTMM_FLAT_R, .r = body->given + MSTMM_GIVEN_SHIFT,
             .G = block + MSTMM_FLAT_GAIN, .e = block + MSTMM_FLAT_E,
             .tau = block + MSTMM_FLAT_TAU, .y = block + MSTMM_FLAT_OFFSET,
             .e_I = parent + MSTMM_FLAT_E);
     } else {
-        mstmm_planar_push_on_ground(
+        mstmm_planar_ground_column_load(
             .e = block + MSTMM_FLAT_E, .tau = block + MSTMM_FLAT_TAU,
             .y = block + MSTMM_FLAT_OFFSET);
     }
     for (int c = 0; c < looped->n_pending; c++) {
         const mstmm_pending *pending = &looped->pending[c];
         if ((body->parent >= 0)) {
-            mstmm_planar_push(
+            mstmm_planar_column_load(
                 .Rc = block + MSTMM_FLAT_R, .r = body->given + MSTMM_GIVEN_SHIFT,
                 .G = block + MSTMM_FLAT_GAIN, .e = loops + pending->column, .tau = mstmm_zeros,
                 .y = loops + pending->y, .e_I = loops + pending->onward);
         }
         if (!(body->parent >= 0)) {
-            mstmm_planar_push_on_ground(
+            mstmm_planar_ground_column_load(
                 .e = loops + pending->column, .tau = mstmm_zeros, .y = loops + pending->y);
         }
         mstmm_planar_divide(
             .F = block + MSTMM_FLAT_F, .y = loops + pending->y, .z = z);
-        mstmm_planar_answered(
+        mstmm_planar_add_known_part(
             .y = block + MSTMM_FLAT_OFFSET, .z = z,
             .l = loops + MSTMM_ROW * (int64_t)pending->row + MSTMM_ROW_KNOWN);
         for (int b = 0; b <= c; b++) {
@@ -2034,8 +2034,8 @@ static int mstmm_at_carried_in_plane(mstmm_state *state, int index)
     return 0;
 }
 
-/* The multiplier of a row, from the motion of the body where it closes. */
-static int mstmm_at_row_found_in_plane(mstmm_state *state, int index)
+/* Multiplier of a row, from the motion of the body where it closes. */
+static int mstmm_at_row_multiplier_in_plane(mstmm_state *state, int index)
 {
     real *loops = state->workspace + state->model->loops;
     const mstmm_loop_row *row = &state->model->rows[index];
@@ -2045,13 +2045,13 @@ static int mstmm_at_row_found_in_plane(mstmm_state *state, int index)
         .x = line + MSTMM_ROW_X);
     if ((row->body >= 0)) {
         real *meeting = mstmm_flat_block(state, row->body);
-        mstmm_planar_multiplier_more(
+        mstmm_planar_multiplier_of_motion(
             .inverse = line + MSTMM_ROW_INVERSE, .K = line + MSTMM_ROW_K,
             .delta = meeting + MSTMM_FLAT_DELTA, .x = line + MSTMM_ROW_X);
     }
     for (int c = 0; c < row->n_others; c++) {
         const mstmm_other *other = &row->others[c];
-        mstmm_loops_multiplier_less(
+        mstmm_loops_multiplier_of_row(
             .inverse = line + MSTMM_ROW_INVERSE, .L_p = loops + other->pair,
             .x_p = loops + MSTMM_ROW * (int64_t)other->row + MSTMM_ROW_X,
             .x = line + MSTMM_ROW_X);
@@ -2060,7 +2060,7 @@ static int mstmm_at_row_found_in_plane(mstmm_state *state, int index)
 }
 
 /* Accelerations of a hinge under the multipliers of its open rows. */
-static int mstmm_at_answered_in_plane(mstmm_state *state, int index)
+static int mstmm_at_recover_with_rows_in_plane(mstmm_state *state, int index)
 {
     const mstmm_flat_body *body = &state->model->flat[index];
     real *block = mstmm_flat_block(state, index);
@@ -2068,28 +2068,28 @@ static int mstmm_at_answered_in_plane(mstmm_state *state, int index)
     const mstmm_flat_body *looped = body;
     real *loops = state->workspace + state->model->loops;
     int code;
-    if (body->aside) return 0;
+    if (body->omitted) return 0;
     for (int c = 0; c < looped->n_pending; c++) {
         const mstmm_pending *pending = &looped->pending[c];
-        mstmm_planar_pull(
+        mstmm_planar_add_multiplier_effort(
             .y = loops + pending->y,
             .x = loops + MSTMM_ROW * (int64_t)pending->row + MSTMM_ROW_X,
             .y_0 = block + MSTMM_FLAT_OFFSET);
     }
-    mstmm_planar_answer(
+    mstmm_planar_column_acceleration(
         .Rc = block + MSTMM_FLAT_R, .r = body->given + MSTMM_GIVEN_SHIFT,
         .F = block + MSTMM_FLAT_F, .G = block + MSTMM_FLAT_GAIN, .y = block + MSTMM_FLAT_OFFSET,
         .delta_I = parent + MSTMM_FLAT_DELTA, .udot = state->udot + body->u,
         .delta = block + MSTMM_FLAT_DELTA);
     for (int r = looped->first_row + looped->n_rows - 1; r >= looped->first_row; r--) {
-        code = mstmm_at_row_found_in_plane(state, r);
+        code = mstmm_at_row_multiplier_in_plane(state, r);
         if (code) return code;
     }
     return 0;
 }
 
 /* Accelerations and load of a cut hinge. */
-static int mstmm_at_closures_answered_in_plane(mstmm_state *state, int index)
+static int mstmm_at_closure_accelerations_in_plane(mstmm_state *state, int index)
 {
     real along[1];
     const mstmm_closure *closure = &state->model->closures[index];
@@ -2099,7 +2099,7 @@ static int mstmm_at_closures_answered_in_plane(mstmm_state *state, int index)
     const int nu = 1;
     real *outboard = mstmm_flat_block(state, closure->outboard);
     mstmm_set_zero(state->udot + body->u, nu);
-    mstmm_planar_told(
+    mstmm_planar_row_acceleration(
         .J_A = block + MSTMM_FLAT_S, .J_B = block + MSTMM_FLAT_S + 3,
         .l = block + MSTMM_FLAT_DELTA, .delta_A = parent + MSTMM_FLAT_DELTA,
         .delta_B = outboard + MSTMM_FLAT_DELTA, .c = along);
@@ -2108,24 +2108,24 @@ static int mstmm_at_closures_answered_in_plane(mstmm_state *state, int index)
 }
 
 /* Rows of couplings at the given accelerations, and the efforts of their multipliers. */
-static int mstmm_at_couplings_loaded(mstmm_state *state, int index)
+static int mstmm_at_coupling_loads(mstmm_state *state, int index)
 {
     const mstmm_body *body = &state->model->bodies[index];
     real *block = state->workspace + body->block;
     const int nu = body->nu;
     const mstmm_looped *looped = &state->model->looped[index];
     real *loops = state->workspace + state->model->loops;
-    if (mstmm_aside(state->model, state->observed, index)) return 0;
+    if (mstmm_omitted(state->model, state->observed, index)) return 0;
     for (int c = 0; c < looped->n_pending; c++) {
         const mstmm_pending *pending = &looped->pending[c];
         if ((pending->tau >= 0)) {
-            mstmm_generic_pull(nu,
+            mstmm_generic_add_multiplier_effort(nu,
                 .y = loops + pending->tau,
                 .x = loops + MSTMM_ROW * (int64_t)pending->row + MSTMM_ROW_X,
                 .y_0 = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU));
         }
         if ((pending->tau >= 0)) {
-            mstmm_generic_answered(nu,
+            mstmm_generic_add_known_part(nu,
                 .y = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .z = loops + pending->tau,
                 .l = loops + MSTMM_ROW * (int64_t)pending->row + MSTMM_ROW_KNOWN);
         }
@@ -2134,7 +2134,7 @@ static int mstmm_at_couplings_loaded(mstmm_state *state, int index)
 }
 
 /* Rows of a cut hinge, and its complete load on its bodies. */
-static int mstmm_at_closures_loaded(mstmm_state *state, int index)
+static int mstmm_at_closure_loads(mstmm_state *state, int index)
 {
     real drift[6];
     const mstmm_body *body = &state->model->bodies[index];
@@ -2153,7 +2153,7 @@ static int mstmm_at_closures_loaded(mstmm_state *state, int index)
             .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H), .W = closed + MSTMM_CLOSURE_W);
         if (code) return mstmm_fail(state, MSTMM_FAILED_HINGE, index, code);
     }
-    mstmm_loops_meet(
+    mstmm_loops_relative_pose(
         .A_C = block + MSTMM_BLOCK_A, .x_C = block + MSTMM_BLOCK_X,
         .A_B = outboard + MSTMM_BLOCK_A, .x_B = outboard + MSTMM_BLOCK_X, .r_e = closure->end,
         .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
@@ -2193,11 +2193,11 @@ static int mstmm_at_closures_loaded(mstmm_state *state, int index)
             .p = closure->p, .R_C = closed + MSTMM_CLOSURE_R_C,
             .slip = closed + MSTMM_CLOSURE_SLIP, .drift = drift);
     }
-    mstmm_loops_known(
+    mstmm_loops_known_parts(
         .W = closed + MSTMM_CLOSURE_W, .relative = drift, .l = closed + MSTMM_CLOSURE_L);
     for (int c = 0; c < looped->n_own; c++) {
         const mstmm_own *own = &looped->own[c];
-        mstmm_generic_pull(nu,
+        mstmm_generic_add_multiplier_effort(nu,
             .y = loops + own->tau, .x = loops + MSTMM_ROW * (int64_t)own->row + MSTMM_ROW_X,
             .y_0 = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU));
     }
@@ -2207,10 +2207,10 @@ static int mstmm_at_closures_loaded(mstmm_state *state, int index)
             .r_e = closure->end, .Rc = block + MSTMM_BLOCK_R,
             .r_A = closed + MSTMM_CLOSURE_LEVER, .J_A = closed + MSTMM_CLOSURE_J_A + 6 * k,
             .J_B = closed + MSTMM_CLOSURE_J_B + 6 * k);
-        mstmm_loops_act(
+        mstmm_loops_apply_effort(
             .J = closed + MSTMM_CLOSURE_J_A + 6 * k,
             .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k, .e = parent + MSTMM_BLOCK_E);
-        mstmm_loops_act(
+        mstmm_loops_apply_effort(
             .J = closed + MSTMM_CLOSURE_J_B + 6 * k,
             .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k,
             .e = outboard + MSTMM_BLOCK_E);
@@ -2222,29 +2222,29 @@ static int mstmm_at_closures_loaded(mstmm_state *state, int index)
             .r_e = closure->end, .Rc = block + MSTMM_BLOCK_R,
             .r_A = closed + MSTMM_CLOSURE_LEVER, .J_A = closed + MSTMM_CLOSURE_J_A + 6 * c,
             .J_B = closed + MSTMM_CLOSURE_J_B + 6 * c);
-        mstmm_loops_loaded(
+        mstmm_loops_apply_multiplier(
             .K = closed + MSTMM_CLOSURE_J_A + 6 * c,
             .x = loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_X,
             .e = parent + MSTMM_BLOCK_E);
-        mstmm_loops_loaded(
+        mstmm_loops_apply_multiplier(
             .K = closed + MSTMM_CLOSURE_J_B + 6 * c,
             .x = loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_X,
             .e = outboard + MSTMM_BLOCK_E);
     }
     for (int c = 0; c < looped->n_own; c++) {
         const mstmm_own *own = &looped->own[c];
-        mstmm_generic_answered(nu,
+        mstmm_generic_add_known_part(nu,
             .y = closed + MSTMM_CLOSURE_L, .z = loops + own->tau,
             .l = loops + MSTMM_ROW * (int64_t)own->row + MSTMM_ROW_KNOWN);
-        mstmm_generic_answered(nu,
+        mstmm_generic_add_known_part(nu,
             .y = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .z = loops + own->tau,
             .l = loops + MSTMM_ROW * (int64_t)own->row + MSTMM_ROW_KNOWN);
     }
     return 0;
 }
 
-/* Efforts required beyond those of the laws, and the load on the parent. */
-static int mstmm_at_required(mstmm_state *state, int index)
+/* Efforts required beyond those of laws, and load on the parent. */
+static int mstmm_at_required_efforts(mstmm_state *state, int index)
 {
     real tau[6];
     const mstmm_body *body = &state->model->bodies[index];
@@ -2280,7 +2280,7 @@ static int mstmm_at_required(mstmm_state *state, int index)
         .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H), .f = block + MSTMM_BLOCK_E, .tau = tau);
     for (int k = 0; k < body->nu; k++) {
         mstmm_frames_driven_effort(
-            .felt = tau + k, .J = body->rotor + k, .udot = state->given + body->u + k,
+            .load = tau + k, .J = body->rotor + k, .udot = state->given + body->u + k,
             .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k,
             .tau_d = state->required + body->u + k);
     }
@@ -2291,7 +2291,7 @@ static int mstmm_at_required(mstmm_state *state, int index)
 }
 
 /* Loads and efforts set to zero: only the rows are to be satisfied. */
-static int mstmm_at_unloaded(mstmm_state *state, int index)
+static int mstmm_at_clear_loads(mstmm_state *state, int index)
 {
     const mstmm_body *body = &state->model->bodies[index];
     real *block = state->workspace + body->block;
@@ -2334,7 +2334,7 @@ static int mstmm_at_factorise(mstmm_state *state, int index)
         real *modes = modal ? state->workspace + modal->place : NULL;
         const mstmm_section *section = body->section;
         real *laid = section ? state->workspace + section->place : NULL;
-        mstmm_modal_absorb(
+        mstmm_modal_assemble_port(
             .n = modal->n, .Rc = block + MSTMM_BLOCK_HINGE_R, .r = block + MSTMM_BLOCK_HINGE_D,
             .H = laid + MSTMM_SECTION_H(n), .S = block + MSTMM_BLOCK_S,
             .e = block + MSTMM_BLOCK_E, .U = laid + MSTMM_SECTION_PUSH(n),
@@ -2376,8 +2376,8 @@ static int mstmm_at_column(mstmm_state *state, int index)
     return 0;
 }
 
-/* Load of the right-hand side carried across the hinge to the parent. */
-static int mstmm_at_column_carried(mstmm_state *state, int index)
+/* Load of the right-hand side carried to the parent. */
+static int mstmm_at_column_backward(mstmm_state *state, int index)
 {
     real e_c[6];
     real hinge_tau_free[6];
@@ -2404,7 +2404,7 @@ static int mstmm_at_column_carried(mstmm_state *state, int index)
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
         real *modes = modal ? state->workspace + modal->place : NULL;
-        mstmm_modal_pushed(
+        mstmm_modal_column_load(
             .n = modal->n, .Gg = modes + MSTMM_MODES_GAIN(n), .e = block + MSTMM_BLOCK_E,
             .e_f = modes + MSTMM_MODES_E_F(n), .e_c = e_c);
         memcpy(block + MSTMM_BLOCK_E, e_c, 6 * sizeof(real));
@@ -2423,7 +2423,7 @@ static int mstmm_at_column_carried(mstmm_state *state, int index)
     }
     for (int k = 0; k < speeds; k++)
         hinge_tau_free[k] = (mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU))[columns[k]];
-    mstmm_generic_push(speeds,
+    mstmm_generic_column_load(speeds,
         .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
         .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE),
         .G = mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN), .e = block + MSTMM_BLOCK_E,
@@ -2433,7 +2433,7 @@ static int mstmm_at_column_carried(mstmm_state *state, int index)
 }
 
 /* Accelerations due to the right-hand side. */
-static int mstmm_at_column_answered(mstmm_state *state, int index)
+static int mstmm_at_column_forward(mstmm_state *state, int index)
 {
     real delta[6];
     const mstmm_body *body = &state->model->bodies[index];
@@ -2443,7 +2443,7 @@ static int mstmm_at_column_answered(mstmm_state *state, int index)
     int columns[6];
     const int speeds = mstmm_free_speeds(state->memory, body, columns);
     if (mstmm_idle(state->observed, body)) return 0;
-    mstmm_generic_answer(speeds,
+    mstmm_generic_column_acceleration(speeds,
         .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
         .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE),
         .F = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
@@ -2459,7 +2459,7 @@ static int mstmm_at_column_answered(mstmm_state *state, int index)
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
         real *modes = modal ? state->workspace + modal->place : NULL;
-        mstmm_modal_answer(
+        mstmm_modal_column_acceleration(
             .n = modal->n, .S_ff = modes + MSTMM_MODES_S_FF(n),
             .e_f = modes + MSTMM_MODES_E_F(n), .Gg = modes + MSTMM_MODES_GAIN(n),
             .delta_I = block + MSTMM_BLOCK_DELTA, .y = modes + MSTMM_MODES_RIGHT(n),
@@ -2473,7 +2473,7 @@ static int mstmm_at_column_answered(mstmm_state *state, int index)
         real *modes = modal ? state->workspace + modal->place : NULL;
         const mstmm_section *section = body->section;
         real *laid = section ? state->workspace + section->place : NULL;
-        mstmm_modal_displaced(
+        mstmm_modal_port_deviation(
             .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .etadd = modes + MSTMM_MODES_ETADD(n),
             .delta_I = block + MSTMM_BLOCK_DELTA, .delta = delta);
         memcpy(block + MSTMM_BLOCK_DELTA, delta, 6 * sizeof(real));
@@ -2482,7 +2482,7 @@ static int mstmm_at_column_answered(mstmm_state *state, int index)
 }
 
 /* Derivatives: given accelerations: all, or zero. */
-static int mstmm_at_prescribed_slope(mstmm_state *state, int index)
+static int mstmm_at_prescribed_accelerations_slope(mstmm_state *state, int index)
 {
     const mstmm_body *body = &state->model->bodies[index];
     if (state->given) {
@@ -2534,7 +2534,7 @@ static int mstmm_at_section_motion_slope(mstmm_state *state, int index)
         .d_xdd = d_laid + MSTMM_SECTION_XDD(n), .d_Psidd = d_laid + MSTMM_SECTION_PSIDD(n));
     if (body->section && !body->section->inward) {
         real *d_block = state->slope->workspace + body->block;
-        mstmm_modal_outward_slope(
+        mstmm_modal_end_motion_slope(
             .R_end = section->end, .x = laid + MSTMM_SECTION_X(n),
             .Psi = laid + MSTMM_SECTION_PSI(n), .xd = laid + MSTMM_SECTION_XD(n),
             .Psid = laid + MSTMM_SECTION_PSID(n), .xdd = laid + MSTMM_SECTION_XDD(n),
@@ -2547,7 +2547,7 @@ static int mstmm_at_section_motion_slope(mstmm_state *state, int index)
             .d_c = d_block + MSTMM_BLOCK_HINGE_C);
     } else {
         real *d_block = state->slope->workspace + body->block;
-        mstmm_modal_inward_slope(
+        mstmm_modal_frame_motion_slope(
             .R_end = section->end, .x = laid + MSTMM_SECTION_X(n),
             .Psi = laid + MSTMM_SECTION_PSI(n), .xd = laid + MSTMM_SECTION_XD(n),
             .Psid = laid + MSTMM_SECTION_PSID(n), .xdd = laid + MSTMM_SECTION_XDD(n),
@@ -2566,7 +2566,7 @@ static int mstmm_at_section_motion_slope(mstmm_state *state, int index)
     if (state->given) {
         real *block = state->workspace + body->block;
         real *d_block = state->slope->workspace + body->block;
-        mstmm_modal_imposed_slope(
+        mstmm_modal_prescribed_bias_slope(
             .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .s = state->given + modal->u,
             .c = block + MSTMM_BLOCK_HINGE_C, .d_H = d_laid + MSTMM_SECTION_H(n),
             .d_s = state->slope->given + modal->u, .d_c = d_block + MSTMM_BLOCK_HINGE_C,
@@ -2618,7 +2618,7 @@ static int mstmm_at_modal_own_slope(mstmm_state *state, int index)
     for (int j = 0; j < n; j++)
         (state->slope->qdot + modal->q)[j] = (state->slope->u + modal->u)[j];
     if (state->given) {
-        mstmm_modal_prescribed_slope(
+        mstmm_modal_prescribed_load_slope(
             .n = modal->n, .S_rf = modes + MSTMM_MODES_S_RF(n),
             .S_ff = modes + MSTMM_MODES_S_FF(n), .s = state->given + modal->u,
             .d_S_rf = d_modes + MSTMM_MODES_S_RF(n), .d_s = state->slope->given + modal->u,
@@ -2722,7 +2722,7 @@ static int mstmm_at_laws_slope(mstmm_state *state, int index)
 }
 
 /* Derivatives: rows of couplings at the given accelerations, and the efforts of their multipliers. */
-static int mstmm_at_couplings_loaded_slope(mstmm_state *state, int index)
+static int mstmm_at_coupling_loads_slope(mstmm_state *state, int index)
 {
     const mstmm_body *body = &state->model->bodies[index];
     real *block = state->workspace + body->block;
@@ -2731,11 +2731,11 @@ static int mstmm_at_couplings_loaded_slope(mstmm_state *state, int index)
     real *loops = state->workspace + state->model->loops;
     real *d_block = state->slope->workspace + body->block;
     real *d_loops = state->slope->workspace + state->model->loops;
-    if (mstmm_aside(state->model, state->observed, index)) return 0;
+    if (mstmm_omitted(state->model, state->observed, index)) return 0;
     for (int c = 0; c < looped->n_pending; c++) {
         const mstmm_pending *pending = &looped->pending[c];
         if ((pending->tau >= 0)) {
-            mstmm_generic_pull_slope(nu,
+            mstmm_generic_add_multiplier_effort_slope(nu,
                 .y = loops + pending->tau,
                 .x = loops + MSTMM_ROW * (int64_t)pending->row + MSTMM_ROW_X,
                 .d_y = d_loops + pending->tau,
@@ -2743,7 +2743,7 @@ static int mstmm_at_couplings_loaded_slope(mstmm_state *state, int index)
                 .d_y_0 = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU));
         }
         if ((pending->tau >= 0)) {
-            mstmm_generic_answered_slope(nu,
+            mstmm_generic_add_known_part_slope(nu,
                 .y = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .z = loops + pending->tau,
                 .d_y = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_S),
                 .d_z = d_loops + pending->tau,
@@ -2798,10 +2798,10 @@ static int mstmm_at_drag_slope(mstmm_state *state, int index)
         .Y_z = modal->drag->y[2], .G_x = modal->drag->g[0], .G_y = modal->drag->g[1],
         .G_z = modal->drag->g[2], .M = modal->drag->m, .eta = state->q + modal->q,
         .etad = state->u + modal->u, .v = block + MSTMM_BLOCK_V, .w = block + MSTMM_BLOCK_MOTION,
-        .S_rf = modes + MSTMM_MODES_BASED(n), .A = modes + MSTMM_MODES_A_DRAG(n),
+        .S_rf = modes + MSTMM_MODES_S_RF_I(n), .A = modes + MSTMM_MODES_A_DRAG(n),
         .h_f = modes + MSTMM_MODES_RIGHT(n), .d_eta = state->slope->q + modal->q,
         .d_etad = state->slope->u + modal->u, .d_v = d_block + MSTMM_BLOCK_V,
-        .d_w = d_block + MSTMM_BLOCK_MOTION, .d_S_rf = d_modes + MSTMM_MODES_BASED(n),
+        .d_w = d_block + MSTMM_BLOCK_MOTION, .d_S_rf = d_modes + MSTMM_MODES_S_RF_I(n),
         .d_A = d_modes + MSTMM_MODES_A_DRAG(n), .d_h = d_h,
         .d_h_f = d_modes + MSTMM_MODES_RIGHT(n));
     for (int j = 0; j < 6; j++)
@@ -2896,10 +2896,10 @@ static int mstmm_at_forces_slope(mstmm_state *state, int index)
         .gravity = mstmm_zeros, .d_A = d_from + MSTMM_BLOCK_A, .d_x = d_from + MSTMM_BLOCK_X,
         .d_v = d_from + MSTMM_BLOCK_V, .d_motion = d_from + MSTMM_BLOCK_MOTION, .d_x_K = d_x_F,
         .d_v_K = d_v_F);
-    mstmm_frames_turning(
+    mstmm_frames_angular_motion(
         .A = from + MSTMM_BLOCK_A, .motion = from + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros,
         .w_K = w_F, .alpha_K = unused_alpha_K);
-    mstmm_frames_turning_slope(
+    mstmm_frames_angular_motion_slope(
         .A = from + MSTMM_BLOCK_A, .motion = from + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros,
         .d_A = d_from + MSTMM_BLOCK_A, .d_motion = d_from + MSTMM_BLOCK_MOTION, .d_w_K = d_w_F);
     mstmm_frames_end_frame(
@@ -2917,10 +2917,10 @@ static int mstmm_at_forces_slope(mstmm_state *state, int index)
         .gravity = mstmm_zeros, .d_A = d_to + MSTMM_BLOCK_A, .d_x = d_to + MSTMM_BLOCK_X,
         .d_v = d_to + MSTMM_BLOCK_V, .d_motion = d_to + MSTMM_BLOCK_MOTION, .d_x_K = d_x_T,
         .d_v_K = d_v_T);
-    mstmm_frames_turning(
+    mstmm_frames_angular_motion(
         .A = to + MSTMM_BLOCK_A, .motion = to + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros,
         .w_K = w_T, .alpha_K = unused_alpha_K);
-    mstmm_frames_turning_slope(
+    mstmm_frames_angular_motion_slope(
         .A = to + MSTMM_BLOCK_A, .motion = to + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros,
         .d_A = d_to + MSTMM_BLOCK_A, .d_motion = d_to + MSTMM_BLOCK_MOTION, .d_w_K = d_w_T);
     mstmm_frames_end_frame(
@@ -2951,9 +2951,9 @@ static int mstmm_at_forces_slope(mstmm_state *state, int index)
         .w_F = w_F, .A_T = A_T, .x_T = x_T, .v_T = v_T, .w_T = w_T, .d_t = &state->slope->t,
         .d_effort = d_effort, .d_A_F = d_A_F, .d_x_F = d_x_F, .d_v_F = d_v_F, .d_w_F = d_w_F,
         .d_A_T = d_A_T, .d_x_T = d_x_T, .d_v_T = d_v_T, .d_w_T = d_w_T, .d_F = d_F, .d_M = d_M);
-    mstmm_frames_opposite(
+    mstmm_frames_reaction_wrench(
         .x_F = x_F, .x_T = x_T, .F = F, .M = M, .F_back = F_back, .M_back = M_back);
-    mstmm_frames_opposite_slope(
+    mstmm_frames_reaction_wrench_slope(
         .x_F = x_F, .x_T = x_T, .F = F, .M = M, .d_x_F = d_x_F, .d_x_T = d_x_T, .d_F = d_F,
         .d_M = d_M, .d_F_back = d_F_back, .d_M_back = d_M_back);
     mstmm_frames_applied_load_slope(
@@ -2968,7 +2968,7 @@ static int mstmm_at_forces_slope(mstmm_state *state, int index)
 }
 
 /* Derivatives: rows of a cut hinge, and its complete load on its bodies. */
-static int mstmm_at_closures_loaded_slope(mstmm_state *state, int index)
+static int mstmm_at_closure_loads_slope(mstmm_state *state, int index)
 {
     real drift[6];
     real d_drift[6];
@@ -2992,7 +2992,7 @@ static int mstmm_at_closures_loaded_slope(mstmm_state *state, int index)
             .d_H = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H),
             .d_W = d_closed + MSTMM_CLOSURE_W);
     }
-    mstmm_loops_meet_slope(
+    mstmm_loops_relative_pose_slope(
         .A_C = block + MSTMM_BLOCK_A, .x_C = block + MSTMM_BLOCK_X,
         .A_B = outboard + MSTMM_BLOCK_A, .x_B = outboard + MSTMM_BLOCK_X, .r_e = closure->end,
         .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
@@ -3048,12 +3048,12 @@ static int mstmm_at_closures_loaded_slope(mstmm_state *state, int index)
             .slip = closed + MSTMM_CLOSURE_SLIP, .d_R_C = d_closed + MSTMM_CLOSURE_R_C,
             .d_slip = d_closed + MSTMM_CLOSURE_SLIP, .d_drift = d_drift);
     }
-    mstmm_loops_known_slope(
+    mstmm_loops_known_parts_slope(
         .W = closed + MSTMM_CLOSURE_W, .relative = drift, .d_W = d_closed + MSTMM_CLOSURE_W,
         .d_relative = d_drift, .d_l = d_closed + MSTMM_CLOSURE_L);
     for (int c = 0; c < looped->n_own; c++) {
         const mstmm_own *own = &looped->own[c];
-        mstmm_generic_pull_slope(nu,
+        mstmm_generic_add_multiplier_effort_slope(nu,
             .y = loops + own->tau, .x = loops + MSTMM_ROW * (int64_t)own->row + MSTMM_ROW_X,
             .d_y = d_loops + own->tau,
             .d_x = d_loops + MSTMM_ROW * (int64_t)own->row + MSTMM_ROW_X,
@@ -3068,13 +3068,13 @@ static int mstmm_at_closures_loaded_slope(mstmm_state *state, int index)
             .d_r_A = d_closed + MSTMM_CLOSURE_LEVER,
             .d_J_A = d_closed + MSTMM_CLOSURE_J_A + 6 * k,
             .d_J_B = d_closed + MSTMM_CLOSURE_J_B + 6 * k);
-        mstmm_loops_act_slope(
+        mstmm_loops_apply_effort_slope(
             .J = closed + MSTMM_CLOSURE_J_A + 6 * k,
             .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k,
             .d_J = d_closed + MSTMM_CLOSURE_J_A + 6 * k,
             .d_tau = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU) + k,
             .d_e = d_parent + MSTMM_BLOCK_E);
-        mstmm_loops_act_slope(
+        mstmm_loops_apply_effort_slope(
             .J = closed + MSTMM_CLOSURE_J_B + 6 * k,
             .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k,
             .d_J = d_closed + MSTMM_CLOSURE_J_B + 6 * k,
@@ -3091,13 +3091,13 @@ static int mstmm_at_closures_loaded_slope(mstmm_state *state, int index)
             .d_r_A = d_closed + MSTMM_CLOSURE_LEVER,
             .d_J_A = d_closed + MSTMM_CLOSURE_J_A + 6 * c,
             .d_J_B = d_closed + MSTMM_CLOSURE_J_B + 6 * c);
-        mstmm_loops_loaded_slope(
+        mstmm_loops_apply_multiplier_slope(
             .K = closed + MSTMM_CLOSURE_J_A + 6 * c,
             .x = loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_X,
             .d_K = d_closed + MSTMM_CLOSURE_J_A + 6 * c,
             .d_x = d_loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_X,
             .d_e = d_parent + MSTMM_BLOCK_E);
-        mstmm_loops_loaded_slope(
+        mstmm_loops_apply_multiplier_slope(
             .K = closed + MSTMM_CLOSURE_J_B + 6 * c,
             .x = loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_X,
             .d_K = d_closed + MSTMM_CLOSURE_J_B + 6 * c,
@@ -3106,11 +3106,11 @@ static int mstmm_at_closures_loaded_slope(mstmm_state *state, int index)
     }
     for (int c = 0; c < looped->n_own; c++) {
         const mstmm_own *own = &looped->own[c];
-        mstmm_generic_answered_slope(nu,
+        mstmm_generic_add_known_part_slope(nu,
             .y = closed + MSTMM_CLOSURE_L, .z = loops + own->tau,
             .d_y = d_closed + MSTMM_CLOSURE_L, .d_z = d_loops + own->tau,
             .d_l = d_loops + MSTMM_ROW * (int64_t)own->row + MSTMM_ROW_KNOWN);
-        mstmm_generic_answered_slope(nu,
+        mstmm_generic_add_known_part_slope(nu,
             .y = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .z = loops + own->tau,
             .d_y = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_S), .d_z = d_loops + own->tau,
             .d_l = d_loops + MSTMM_ROW * (int64_t)own->row + MSTMM_ROW_KNOWN);
@@ -3118,8 +3118,8 @@ static int mstmm_at_closures_loaded_slope(mstmm_state *state, int index)
     return 0;
 }
 
-/* Derivatives: efforts required beyond those of the laws, and the load on the parent. */
-static int mstmm_at_required_slope(mstmm_state *state, int index)
+/* Derivatives: efforts required beyond those of laws, and load on the parent. */
+static int mstmm_at_required_efforts_slope(mstmm_state *state, int index)
 {
     real tau[6];
     real d_tau[6];
@@ -3160,8 +3160,8 @@ static int mstmm_at_required_slope(mstmm_state *state, int index)
         .d_tau = d_tau);
     for (int k = 0; k < body->nu; k++) {
         mstmm_frames_driven_effort_slope(
-            .felt = tau + k, .J = body->rotor + k, .udot = state->given + body->u + k,
-            .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k, .d_felt = d_tau + k,
+            .load = tau + k, .J = body->rotor + k, .udot = state->given + body->u + k,
+            .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k, .d_load = d_tau + k,
             .d_udot = state->slope->given + body->u + k,
             .d_tau = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU) + k,
             .d_tau_d = state->slope->required + body->u + k);
@@ -3269,10 +3269,10 @@ static int mstmm_at_forces_across(mstmm_state *state, int index)
         .gravity = mstmm_zeros, .d_A = d_from + MSTMM_BLOCK_A, .d_x = d_from + MSTMM_BLOCK_X,
         .d_v = d_from + MSTMM_BLOCK_V, .d_motion = d_from + MSTMM_BLOCK_MOTION, .d_x_K = d_x_F,
         .d_v_K = d_v_F);
-    mstmm_frames_turning(
+    mstmm_frames_angular_motion(
         .A = from + MSTMM_BLOCK_A, .motion = from + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros,
         .w_K = w_F, .alpha_K = unused_alpha_K);
-    mstmm_frames_turning_slope(
+    mstmm_frames_angular_motion_slope(
         .A = from + MSTMM_BLOCK_A, .motion = from + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros,
         .d_A = d_from + MSTMM_BLOCK_A, .d_motion = d_from + MSTMM_BLOCK_MOTION, .d_w_K = d_w_F);
     mstmm_frames_end_frame(
@@ -3290,10 +3290,10 @@ static int mstmm_at_forces_across(mstmm_state *state, int index)
         .gravity = mstmm_zeros, .d_A = d_to + MSTMM_BLOCK_A, .d_x = d_to + MSTMM_BLOCK_X,
         .d_v = d_to + MSTMM_BLOCK_V, .d_motion = d_to + MSTMM_BLOCK_MOTION, .d_x_K = d_x_T,
         .d_v_K = d_v_T);
-    mstmm_frames_turning(
+    mstmm_frames_angular_motion(
         .A = to + MSTMM_BLOCK_A, .motion = to + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros,
         .w_K = w_T, .alpha_K = unused_alpha_K);
-    mstmm_frames_turning_slope(
+    mstmm_frames_angular_motion_slope(
         .A = to + MSTMM_BLOCK_A, .motion = to + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros,
         .d_A = d_to + MSTMM_BLOCK_A, .d_motion = d_to + MSTMM_BLOCK_MOTION, .d_w_K = d_w_T);
     mstmm_frames_end_frame(
@@ -3324,9 +3324,9 @@ static int mstmm_at_forces_across(mstmm_state *state, int index)
         .w_F = w_F, .A_T = A_T, .x_T = x_T, .v_T = v_T, .w_T = w_T, .d_t = &state->slope->t,
         .d_effort = d_effort, .d_A_F = d_A_F, .d_x_F = d_x_F, .d_v_F = d_v_F, .d_w_F = d_w_F,
         .d_A_T = d_A_T, .d_x_T = d_x_T, .d_v_T = d_v_T, .d_w_T = d_w_T, .d_F = d_F, .d_M = d_M);
-    mstmm_frames_opposite(
+    mstmm_frames_reaction_wrench(
         .x_F = x_F, .x_T = x_T, .F = F, .M = M, .F_back = F_back, .M_back = M_back);
-    mstmm_frames_opposite_slope(
+    mstmm_frames_reaction_wrench_slope(
         .x_F = x_F, .x_T = x_T, .F = F, .M = M, .d_x_F = d_x_F, .d_x_T = d_x_T, .d_F = d_F,
         .d_M = d_M, .d_F_back = d_F_back, .d_M_back = d_M_back);
     mstmm_frames_applied_load_slope(
@@ -3379,8 +3379,8 @@ static int mstmm_at_laws_across(mstmm_state *state, int index)
     return 0;
 }
 
-/* Derivatives of the coordinates of a hinge by its speeds within a step. */
-static int mstmm_at_lag(mstmm_state *state, int index)
+/* Derivatives of a hinge's coordinates by its speeds within a step. */
+static int mstmm_at_increment_matrix(mstmm_state *state, int index)
 {
     const mstmm_body *body = &state->model->bodies[index];
     const int nu = body->nu;
@@ -3388,27 +3388,27 @@ static int mstmm_at_lag(mstmm_state *state, int index)
     real *tangent = state->tangents->numbers + body->tangent;
     mstmm_hinge_rates_by_coordinates_of(state, body,
         .p = body->hinge_p, .q = state->q + body->q, .u = state->u + body->u,
-        .J = tangent + MSTMM_TANGENT_TURNS(body->nu, body->nq));
+        .J = tangent + MSTMM_TANGENT_RATES_BY_COORDINATES(body->nu, body->nq));
     mstmm_hinge_rates_by_speeds_of(state, body,
         .p = body->hinge_p, .q = state->q + body->q, .u = state->u + body->u,
-        .J = tangent + MSTMM_TANGENT_WAYS(body->nu, body->nq));
+        .J = tangent + MSTMM_TANGENT_RATES_BY_SPEEDS(body->nu, body->nq));
     for (int c = 0; c < nq; c++) {
         mstmm_aim_coordinate(state, body, c);
         memcpy(tangent + MSTMM_TANGENT_UNIT(body->nu, body->nq) + nq * c, state->slope->q + body->q, (size_t)(nq) * sizeof(real));
     }
     mstmm_aim_nowhere(state, body);
-    mstmm_tangent_lag(
+    mstmm_tangent_increment_matrix(
         .n = nq, .sq = &state->tangents->sq, .kappa = &state->tangents->kappa,
         .one = tangent + MSTMM_TANGENT_UNIT(body->nu, body->nq),
-        .g_q = tangent + MSTMM_TANGENT_TURNS(body->nu, body->nq),
+        .g_q = tangent + MSTMM_TANGENT_RATES_BY_COORDINATES(body->nu, body->nq),
         .A = tangent + MSTMM_TANGENT_RATES(body->nu, body->nq),
-        .Q = tangent + MSTMM_TANGENT_LAG(body->nu, body->nq),
-        .work = tangent + MSTMM_TANGENT_LAG_WORK(body->nu, body->nq));
+        .Q = tangent + MSTMM_TANGENT_Q(body->nu, body->nq),
+        .work = tangent + MSTMM_TANGENT_Q_WORK(body->nu, body->nq));
     for (int c = 0; c < nu; c++) {
         mstmm_aim_rate(state, body, c);
-        mstmm_tangent_lagged(
-            .n = nq, .Q = tangent + MSTMM_TANGENT_LAG(body->nu, body->nq),
-            .rate = tangent + MSTMM_TANGENT_WAYS(body->nu, body->nq) + nq * c,
+        mstmm_tangent_coordinate_increment(
+            .n = nq, .Q = tangent + MSTMM_TANGENT_Q(body->nu, body->nq),
+            .rate = tangent + MSTMM_TANGENT_RATES_BY_SPEEDS(body->nu, body->nq) + nq * c,
             .dq = tangent + MSTMM_TANGENT_ALONG(body->nu, body->nq) + nq * c);
     }
     mstmm_aim_nowhere(state, body);
@@ -3428,7 +3428,7 @@ static int mstmm_at_tangent_own(mstmm_state *state, int index)
         mstmm_set_zero(tangent + MSTMM_TANGENT_LAWS(body->nu, body->nq), nu * nu);
     }
     if (!body->straight) {
-        code = mstmm_at_lag(state, index);
+        code = mstmm_at_increment_matrix(state, index);
         if (code) return code;
     }
     if (body->placed) {
@@ -3516,7 +3516,7 @@ static int mstmm_at_tangent_own(mstmm_state *state, int index)
         for (int j = 0; j < n * n; j++)
             (bend + MSTMM_BEND_W(n))[j] = 0;
         for (int j = 0; j < 6 * n; j++)
-            (bend + MSTMM_BEND_STILL(n))[j] = 0;
+            (bend + MSTMM_BEND_ZERO_H(n))[j] = 0;
     }
     return 0;
 }
@@ -3531,7 +3531,7 @@ static int mstmm_at_law_slopes(mstmm_state *state, int index)
     int columns[6];
     const int speeds = mstmm_free_speeds(state->memory, body, columns);
     for (int c = 0; c < speeds; c++) {
-        if (mstmm_unfelt(body, law, columns[c])) continue;
+        if (mstmm_law_ignores(body, law, columns[c])) continue;
         mstmm_aim_unknown(state, body, columns[c]);
         if (law->kind == 0) {
             mstmm_law_coordinate_slope(law->evaluate_slope,
@@ -3648,7 +3648,7 @@ static int mstmm_at_forces_by_place(mstmm_state *state, int index)
         .A = from + MSTMM_BLOCK_A, .x = from + MSTMM_BLOCK_X, .v = from + MSTMM_BLOCK_V,
         .motion = from + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros, .offset = force->offset_f,
         .gravity = mstmm_zeros, .x_K = x_F, .v_K = v_F, .a_K = unused_a_K);
-    mstmm_frames_turning(
+    mstmm_frames_angular_motion(
         .A = from + MSTMM_BLOCK_A, .motion = from + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros,
         .w_K = w_F, .alpha_K = unused_alpha_K);
     mstmm_frames_end_frame(
@@ -3657,7 +3657,7 @@ static int mstmm_at_forces_by_place(mstmm_state *state, int index)
         .A = to + MSTMM_BLOCK_A, .x = to + MSTMM_BLOCK_X, .v = to + MSTMM_BLOCK_V,
         .motion = to + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros, .offset = force->offset_t,
         .gravity = mstmm_zeros, .x_K = x_T, .v_K = v_T, .a_K = unused_a_K);
-    mstmm_frames_turning(
+    mstmm_frames_angular_motion(
         .A = to + MSTMM_BLOCK_A, .motion = to + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros,
         .w_K = w_T, .alpha_K = unused_alpha_K);
     mstmm_frames_end_frame(
@@ -3674,7 +3674,7 @@ static int mstmm_at_forces_by_place(mstmm_state *state, int index)
         .w_F = w_F, .A_T = A_T, .x_T = x_T, .v_T = v_T, .w_T = w_T, .F = F, .M = M, .V = V,
         .P = P);
     if (code) return mstmm_fail(state, MSTMM_FAILED_FORCE, index, code);
-    mstmm_frames_opposite(
+    mstmm_frames_reaction_wrench(
         .x_F = x_F, .x_T = x_T, .F = F, .M = M, .F_back = F_back, .M_back = M_back);
     memset(d_A_F, 0, 9 * sizeof(real));
     memset(d_x_F, 0, 3 * sizeof(real));
@@ -3700,7 +3700,7 @@ static int mstmm_at_forces_by_place(mstmm_state *state, int index)
                 .d_motion = d_from + MSTMM_BLOCK_MOTION, .d_x_K = d_x_F, .d_v_K = d_v_F);
         }
         if (force->body_f >= 0) {
-            mstmm_frames_turning_slope(
+            mstmm_frames_angular_motion_slope(
                 .A = from + MSTMM_BLOCK_A, .motion = from + MSTMM_BLOCK_MOTION,
                 .delta = mstmm_zeros, .d_A = d_from + MSTMM_BLOCK_A,
                 .d_motion = d_from + MSTMM_BLOCK_MOTION, .d_w_K = d_w_F);
@@ -3719,7 +3719,7 @@ static int mstmm_at_forces_by_place(mstmm_state *state, int index)
                 .d_motion = d_to + MSTMM_BLOCK_MOTION, .d_x_K = d_x_T, .d_v_K = d_v_T);
         }
         if (force->body_t >= 0) {
-            mstmm_frames_turning_slope(
+            mstmm_frames_angular_motion_slope(
                 .A = to + MSTMM_BLOCK_A, .motion = to + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros,
                 .d_A = d_to + MSTMM_BLOCK_A, .d_motion = d_to + MSTMM_BLOCK_MOTION,
                 .d_w_K = d_w_T);
@@ -3745,7 +3745,7 @@ static int mstmm_at_forces_by_place(mstmm_state *state, int index)
             .d_effort = d_effort, .d_A_F = d_A_F, .d_x_F = d_x_F, .d_v_F = d_v_F, .d_w_F = d_w_F,
             .d_A_T = d_A_T, .d_x_T = d_x_T, .d_v_T = d_v_T, .d_w_T = d_w_T, .d_F = d_F,
             .d_M = d_M);
-        mstmm_frames_opposite_slope(
+        mstmm_frames_reaction_wrench_slope(
             .x_F = x_F, .x_T = x_T, .F = F, .M = M, .d_x_F = d_x_F, .d_x_T = d_x_T, .d_F = d_F,
             .d_M = d_M, .d_F_back = d_F_back, .d_M_back = d_M_back);
         if (force->body_t >= 0) {
@@ -3778,7 +3778,7 @@ static int mstmm_at_forces_by_place(mstmm_state *state, int index)
                 .d_motion = d_from + MSTMM_BLOCK_MOTION, .d_x_K = d_x_F, .d_v_K = d_v_F);
         }
         if (force->body_f >= 0) {
-            mstmm_frames_turning_slope(
+            mstmm_frames_angular_motion_slope(
                 .A = from + MSTMM_BLOCK_A, .motion = from + MSTMM_BLOCK_MOTION,
                 .delta = mstmm_zeros, .d_A = d_from + MSTMM_BLOCK_A,
                 .d_motion = d_from + MSTMM_BLOCK_MOTION, .d_w_K = d_w_F);
@@ -3797,7 +3797,7 @@ static int mstmm_at_forces_by_place(mstmm_state *state, int index)
                 .d_motion = d_to + MSTMM_BLOCK_MOTION, .d_x_K = d_x_T, .d_v_K = d_v_T);
         }
         if (force->body_t >= 0) {
-            mstmm_frames_turning_slope(
+            mstmm_frames_angular_motion_slope(
                 .A = to + MSTMM_BLOCK_A, .motion = to + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros,
                 .d_A = d_to + MSTMM_BLOCK_A, .d_motion = d_to + MSTMM_BLOCK_MOTION,
                 .d_w_K = d_w_T);
@@ -3823,7 +3823,7 @@ static int mstmm_at_forces_by_place(mstmm_state *state, int index)
             .d_effort = d_effort, .d_A_F = d_A_F, .d_x_F = d_x_F, .d_v_F = d_v_F, .d_w_F = d_w_F,
             .d_A_T = d_A_T, .d_x_T = d_x_T, .d_v_T = d_v_T, .d_w_T = d_w_T, .d_F = d_F,
             .d_M = d_M);
-        mstmm_frames_opposite_slope(
+        mstmm_frames_reaction_wrench_slope(
             .x_F = x_F, .x_T = x_T, .F = F, .M = M, .d_x_F = d_x_F, .d_x_T = d_x_T, .d_F = d_F,
             .d_M = d_M, .d_F_back = d_F_back, .d_M_back = d_M_back);
         if (force->body_t >= 0) {
@@ -3873,7 +3873,7 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
     int columns[6];
     const int speeds = mstmm_free_speeds(state->memory, body, columns);
     int code;
-    if (mstmm_aside(state->model, state->observed, index)) return 0;
+    if (mstmm_omitted(state->model, state->observed, index)) return 0;
     if (body->modal && body->section) {
         const int nu = body->nu;
         const mstmm_modal *modal = mstmm_modal_of(body);
@@ -3896,7 +3896,7 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
                 (d_modes + MSTMM_MODES_E_F(n))[j] = 0;
             code = mstmm_at_section_motion_slope(state, index);
             if (code) return code;
-            mstmm_frames_tangent_turned(
+            mstmm_frames_tangent_pose_change(
                 .R = block + MSTMM_BLOCK_HINGE_R, .d_R = d_block + MSTMM_BLOCK_HINGE_R,
                 .d_d = d_block + MSTMM_BLOCK_HINGE_D, .theta = turn, .x = shift);
             mstmm_generic_tangent_column(nu,
@@ -3971,17 +3971,17 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
                     .d_w = d_hinge_w, .d_c = d_hinge_c, .d_qdot = state->slope->qdot + body->q);
             }
             if (body->straight) {
-                mstmm_generic_tangent_along(nu,
+                mstmm_generic_tangent_coordinate_change(nu,
                     .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
                     .d_q = state->slope->q + body->q, .theta = turn, .x = shift);
             }
             if (!body->straight) {
-                mstmm_frames_tangent_turned(
+                mstmm_frames_tangent_pose_change(
                     .R = block + MSTMM_BLOCK_HINGE_R, .d_R = d_hinge_R, .d_d = d_hinge_d,
                     .theta = turn, .x = shift);
             }
             if (body->turning) {
-                mstmm_generic_tangent_turning(nu,
+                mstmm_generic_tangent_rotational(nu,
                     .theta = turn, .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
                     .w = block + MSTMM_BLOCK_HINGE_W, .Q = carrier, .f = block + MSTMM_BLOCK_E,
                     .d_u = state->slope->u + body->u, .d_s = state->slope->given + body->u,
@@ -4048,7 +4048,7 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
                 (d_modes + MSTMM_MODES_E_F(n))[j] = 0;
             code = mstmm_at_section_motion_slope(state, index);
             if (code) return code;
-            mstmm_frames_tangent_turned(
+            mstmm_frames_tangent_pose_change(
                 .R = block + MSTMM_BLOCK_HINGE_R, .d_R = d_block + MSTMM_BLOCK_HINGE_R,
                 .d_d = d_block + MSTMM_BLOCK_HINGE_D, .theta = turn, .x = shift);
             mstmm_generic_tangent_column(nu,
@@ -4107,7 +4107,7 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
         const int n = mstmm_modes_of(modal);
         real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
         code = mstmm_judged(state, mstmm_tangent_node(
-            .n = modal->n, .H = bend + MSTMM_BEND_STILL(n), .B = bend + MSTMM_BEND_B(n),
+            .n = modal->n, .H = bend + MSTMM_BEND_ZERO_H(n), .B = bend + MSTMM_BEND_B(n),
             .G = bend + MSTMM_BEND_G(n), .W = bend + MSTMM_BEND_W(n),
             .S = state->tangents->numbers + mstmm_carried_at(state->tangents, body),
             .K = bend + MSTMM_BEND_K(n), .Z_z = bend + MSTMM_BEND_Z_Z(n),
@@ -4139,7 +4139,7 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
         const int n = mstmm_modes_of(modal);
         real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
         mstmm_tangent_placed_node(
-            .n = modal->n, .H = bend + MSTMM_BEND_STILL(n), .V = bend + MSTMM_BEND_V(n),
+            .n = modal->n, .H = bend + MSTMM_BEND_ZERO_H(n), .V = bend + MSTMM_BEND_V(n),
             .D = bend + MSTMM_BEND_D(n), .S_p = place + MSTMM_PLACE_S(body->nu, body->nq),
             .Z_p = bend + MSTMM_BEND_PLACE_Z(n), .right = bend + MSTMM_BEND_RIGHT(n),
             .gain = bend + MSTMM_BEND_PLACE_GAIN(n), .S_c = S_p,
@@ -4210,7 +4210,7 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
         real *laid = section ? state->workspace + section->place : NULL;
         real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
         real *port = section ? state->tangents->numbers + section->tangent : NULL;
-        mstmm_tangent_absorb(
+        mstmm_tangent_assemble_port(
             .n = modal->n, .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
             .H = laid + MSTMM_SECTION_H(n), .B = port + MSTMM_PORT_B(n),
             .G = port + MSTMM_PORT_G(n), .W = port + MSTMM_PORT_W(n),
@@ -4226,7 +4226,7 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
         real *laid = section ? state->workspace + section->place : NULL;
         real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
         real *port = section ? state->tangents->numbers + section->tangent : NULL;
-        mstmm_tangent_placed_absorb(
+        mstmm_tangent_placed_port(
             .n = modal->n, .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
             .H = laid + MSTMM_SECTION_H(n), .B_p = port + MSTMM_PORT_PLACE_B(n),
             .S_p = place + MSTMM_PLACE_S(body->nu, body->nq), .T_p = T_p,
@@ -4237,7 +4237,7 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
 }
 
 /* Contribution of a body to the elimination. */
-static int mstmm_at_tangent_brought(mstmm_state *state, int index)
+static int mstmm_at_tangent_contributions(mstmm_state *state, int index)
 {
     real carrier[9];
     real turn[3];
@@ -4253,7 +4253,7 @@ static int mstmm_at_tangent_brought(mstmm_state *state, int index)
     int columns[6];
     const int speeds = mstmm_free_speeds(state->memory, body, columns);
     int code;
-    if (mstmm_aside(state->model, state->observed, index)) return 0;
+    if (mstmm_omitted(state->model, state->observed, index)) return 0;
     if (body->modal && body->section) {
         real *block = state->workspace + body->block;
         const int nu = body->nu;
@@ -4277,7 +4277,7 @@ static int mstmm_at_tangent_brought(mstmm_state *state, int index)
                 (d_modes + MSTMM_MODES_E_F(n))[j] = 0;
             code = mstmm_at_section_motion_slope(state, index);
             if (code) return code;
-            mstmm_frames_tangent_turned(
+            mstmm_frames_tangent_pose_change(
                 .R = block + MSTMM_BLOCK_HINGE_R, .d_R = d_block + MSTMM_BLOCK_HINGE_R,
                 .d_d = d_block + MSTMM_BLOCK_HINGE_D, .theta = turn, .x = shift);
             mstmm_generic_tangent_column(nu,
@@ -4354,17 +4354,17 @@ static int mstmm_at_tangent_brought(mstmm_state *state, int index)
                     .d_w = d_hinge_w, .d_c = d_hinge_c, .d_qdot = state->slope->qdot + body->q);
             }
             if (body->straight) {
-                mstmm_generic_tangent_along(nu,
+                mstmm_generic_tangent_coordinate_change(nu,
                     .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
                     .d_q = state->slope->q + body->q, .theta = turn, .x = shift);
             }
             if (!body->straight) {
-                mstmm_frames_tangent_turned(
+                mstmm_frames_tangent_pose_change(
                     .R = block + MSTMM_BLOCK_HINGE_R, .d_R = d_hinge_R, .d_d = d_hinge_d,
                     .theta = turn, .x = shift);
             }
             if (body->turning) {
-                mstmm_generic_tangent_turning(nu,
+                mstmm_generic_tangent_rotational(nu,
                     .theta = turn, .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
                     .w = block + MSTMM_BLOCK_HINGE_W, .Q = carrier, .f = block + MSTMM_BLOCK_E,
                     .d_u = state->slope->u + body->u, .d_s = state->slope->given + body->u,
@@ -4432,7 +4432,7 @@ static int mstmm_at_tangent_brought(mstmm_state *state, int index)
                 (d_modes + MSTMM_MODES_E_F(n))[j] = 0;
             code = mstmm_at_section_motion_slope(state, index);
             if (code) return code;
-            mstmm_frames_tangent_turned(
+            mstmm_frames_tangent_pose_change(
                 .R = block + MSTMM_BLOCK_HINGE_R, .d_R = d_block + MSTMM_BLOCK_HINGE_R,
                 .d_d = d_block + MSTMM_BLOCK_HINGE_D, .theta = turn, .x = shift);
             mstmm_generic_tangent_column(nu,
@@ -4485,14 +4485,14 @@ static int mstmm_at_tangent_column(mstmm_state *state, int index)
 }
 
 /* Loads of a right-hand side carried to the parent. */
-static int mstmm_at_tangent_carried(mstmm_state *state, int index)
+static int mstmm_at_tangent_backward(mstmm_state *state, int index)
 {
     real e_c[6];
     real rows[6];
     const mstmm_body *body = &state->model->bodies[index];
     int columns[6];
     const int speeds = mstmm_free_speeds(state->memory, body, columns);
-    if (mstmm_aside(state->model, state->observed, index)) return 0;
+    if (mstmm_omitted(state->model, state->observed, index)) return 0;
     if (body->modal && body->section) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
@@ -4501,7 +4501,7 @@ static int mstmm_at_tangent_carried(mstmm_state *state, int index)
         real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
         real *d_block = state->slope->workspace + body->block;
         real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
-        mstmm_tangent_push(
+        mstmm_tangent_column_load(
             .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .V = bend + MSTMM_BEND_V(n),
             .D = bend + MSTMM_BEND_D(n), .e = d_block + MSTMM_BLOCK_E,
             .e_f = d_modes + MSTMM_MODES_E_F(n), .rest = bend + MSTMM_BEND_REST(n),
@@ -4514,8 +4514,8 @@ static int mstmm_at_tangent_carried(mstmm_state *state, int index)
         real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
         real *d_block = state->slope->workspace + body->block;
         real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
-        mstmm_tangent_push(
-            .n = modal->n, .H = bend + MSTMM_BEND_STILL(n), .V = bend + MSTMM_BEND_V(n),
+        mstmm_tangent_column_load(
+            .n = modal->n, .H = bend + MSTMM_BEND_ZERO_H(n), .V = bend + MSTMM_BEND_V(n),
             .D = bend + MSTMM_BEND_D(n), .e = d_block + MSTMM_BLOCK_E,
             .e_f = d_modes + MSTMM_MODES_E_F(n), .rest = bend + MSTMM_BEND_REST(n),
             .y = bend + MSTMM_BEND_Y(n), .e_c = e_c, .work = bend + MSTMM_BEND_WORK(n));
@@ -4542,7 +4542,7 @@ static int mstmm_at_tangent_carried(mstmm_state *state, int index)
         real *d_parent = mstmm_block(state->model, state->slope->workspace, body->parent);
         for (int k = 0; k < speeds; k++)
             rows[k] = (mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU))[columns[k]];
-        mstmm_generic_tangent_push(speeds,
+        mstmm_generic_tangent_load(speeds,
             .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
             .H = tangent + MSTMM_TANGENT_H(body->nu, body->nq),
             .V = tangent + MSTMM_TANGENT_V(body->nu, body->nq),
@@ -4561,7 +4561,7 @@ static int mstmm_at_tangent_carried(mstmm_state *state, int index)
 }
 
 /* Solution for a right-hand side. */
-static int mstmm_at_tangent_answered(mstmm_state *state, int index)
+static int mstmm_at_tangent_forward(mstmm_state *state, int index)
 {
     real x[6];
     real p[9];
@@ -4570,13 +4570,13 @@ static int mstmm_at_tangent_answered(mstmm_state *state, int index)
     const int nu = body->nu;
     int columns[6];
     const int speeds = mstmm_free_speeds(state->memory, body, columns);
-    if (mstmm_aside(state->model, state->observed, index)) return 0;
+    if (mstmm_omitted(state->model, state->observed, index)) return 0;
     mstmm_set_zero(state->answer + body->u, nu);
     if (body->placed) {
         real *block = state->workspace + body->block;
         real *place = state->tangents->numbers + body->place;
         real *d_parent = mstmm_block(state->model, state->slope->workspace, body->parent);
-        mstmm_frames_placed_moved(
+        mstmm_frames_placed_displacement(
             .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
             .z_I = d_parent + MSTMM_BLOCK_MOTION,
             .p_I = state->tangents->numbers + mstmm_place_at(state->model, body->parent) + MSTMM_PLACE_Z(0, 0),
@@ -4585,7 +4585,7 @@ static int mstmm_at_tangent_answered(mstmm_state *state, int index)
     if (!body->section && speeds && body->placed) {
         real *tangent = state->tangents->numbers + body->tangent;
         real *place = state->tangents->numbers + body->place;
-        mstmm_tangent_placed_left(
+        mstmm_tangent_placed_remainder(
             .n = speeds, .gain = place + MSTMM_PLACE_GAIN(body->nu, body->nq),
             .p = place + MSTMM_PLACE_Z(body->nu, body->nq),
             .y = tangent + MSTMM_TANGENT_Y(body->nu, body->nq));
@@ -4596,7 +4596,7 @@ static int mstmm_at_tangent_answered(mstmm_state *state, int index)
         real *tangent = state->tangents->numbers + body->tangent;
         real *d_block = state->slope->workspace + body->block;
         real *d_parent = mstmm_block(state->model, state->slope->workspace, body->parent);
-        mstmm_generic_tangent_answer(speeds,
+        mstmm_generic_tangent_solution(speeds,
             .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
             .w_I = parent + MSTMM_BLOCK_MOTION, .v = block + MSTMM_BLOCK_HINGE_V,
             .w = block + MSTMM_BLOCK_HINGE_W, .z_I = d_parent + MSTMM_BLOCK_MOTION,
@@ -4610,7 +4610,7 @@ static int mstmm_at_tangent_answered(mstmm_state *state, int index)
     }
     if (!body->section && speeds && body->placed) {
         real *place = state->tangents->numbers + body->place;
-        mstmm_tangent_displaced(
+        mstmm_tangent_port_motion(
             .n = speeds, .B = place + MSTMM_PLACE_B(body->nu, body->nq), .x = x,
             .z_c = place + MSTMM_PLACE_Z(body->nu, body->nq), .z = p);
         memcpy(place + MSTMM_PLACE_Z(body->nu, body->nq), p, 9 * sizeof(real));
@@ -4620,7 +4620,7 @@ static int mstmm_at_tangent_answered(mstmm_state *state, int index)
         real *parent = mstmm_block(state->model, state->workspace, body->parent);
         real *d_block = state->slope->workspace + body->block;
         real *d_parent = mstmm_block(state->model, state->slope->workspace, body->parent);
-        mstmm_frames_tangent_moved(
+        mstmm_frames_tangent_motion(
             .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
             .w_I = parent + MSTMM_BLOCK_MOTION, .v = block + MSTMM_BLOCK_HINGE_V,
             .w = block + MSTMM_BLOCK_HINGE_W, .z_I = d_parent + MSTMM_BLOCK_MOTION,
@@ -4632,7 +4632,7 @@ static int mstmm_at_tangent_answered(mstmm_state *state, int index)
         const mstmm_section *section = body->section;
         real *port = section ? state->tangents->numbers + section->tangent : NULL;
         real *d_block = state->slope->workspace + body->block;
-        mstmm_tangent_displaced(
+        mstmm_tangent_port_motion(
             .n = modal->n, .B = port + MSTMM_PORT_B(n), .x = state->answer + modal->u,
             .z_c = d_block + MSTMM_BLOCK_MOTION, .z = z);
         memcpy(d_block + MSTMM_BLOCK_MOTION, z, 9 * sizeof(real));
@@ -4643,7 +4643,7 @@ static int mstmm_at_tangent_answered(mstmm_state *state, int index)
         const int n = mstmm_modes_of(modal);
         const mstmm_section *section = body->section;
         real *port = section ? state->tangents->numbers + section->tangent : NULL;
-        mstmm_tangent_displaced(
+        mstmm_tangent_port_motion(
             .n = modal->n, .B = port + MSTMM_PORT_PLACE_B(n), .x = state->answer + modal->u,
             .z_c = place + MSTMM_PLACE_Z(body->nu, body->nq), .z = p);
         memcpy(place + MSTMM_PLACE_Z(body->nu, body->nq), p, 9 * sizeof(real));
@@ -4653,7 +4653,7 @@ static int mstmm_at_tangent_answered(mstmm_state *state, int index)
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
         real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
-        mstmm_tangent_placed_left(
+        mstmm_tangent_placed_remainder(
             .n = modal->n, .gain = bend + MSTMM_BEND_PLACE_GAIN(n),
             .p = place + MSTMM_PLACE_Z(body->nu, body->nq), .y = bend + MSTMM_BEND_Y(n));
     }
@@ -4662,7 +4662,7 @@ static int mstmm_at_tangent_answered(mstmm_state *state, int index)
         const int n = mstmm_modes_of(modal);
         real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
         real *d_block = state->slope->workspace + body->block;
-        mstmm_tangent_answer(
+        mstmm_tangent_column_solution(
             .n = modal->n, .B = bend + MSTMM_BEND_B(n), .gain = bend + MSTMM_BEND_GAIN(n),
             .y = bend + MSTMM_BEND_Y(n), .z_c = d_block + MSTMM_BLOCK_MOTION,
             .x = state->answer + modal->u, .z = z);
@@ -4673,7 +4673,7 @@ static int mstmm_at_tangent_answered(mstmm_state *state, int index)
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
         real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
-        mstmm_tangent_displaced(
+        mstmm_tangent_port_motion(
             .n = modal->n, .B = bend + MSTMM_BEND_PLACE_B(n), .x = state->answer + modal->u,
             .z_c = place + MSTMM_PLACE_Z(body->nu, body->nq), .z = p);
         memcpy(place + MSTMM_PLACE_Z(body->nu, body->nq), p, 9 * sizeof(real));
@@ -4682,7 +4682,7 @@ static int mstmm_at_tangent_answered(mstmm_state *state, int index)
 }
 
 /* A right-hand side, with own loads due to known modal increments. */
-static int mstmm_at_known_column(mstmm_state *state, int index)
+static int mstmm_at_increment_column(mstmm_state *state, int index)
 {
     const mstmm_body *body = &state->model->bodies[index];
     const int nu = body->nu;
@@ -4711,7 +4711,7 @@ static int mstmm_at_known_column(mstmm_state *state, int index)
 }
 
 /* Change of the efforts of a law due to known increments of its hinge. */
-static int mstmm_at_known_laws(mstmm_state *state, int index)
+static int mstmm_at_increment_laws(mstmm_state *state, int index)
 {
     real d_tau[6];
     const mstmm_law *law = &state->model->laws[index];
@@ -4739,15 +4739,15 @@ static int mstmm_at_known_laws(mstmm_state *state, int index)
 }
 
 /* The same loads carried to the parent, with known increments. */
-static int mstmm_at_known_carried(mstmm_state *state, int index)
+static int mstmm_at_increment_backward(mstmm_state *state, int index)
 {
     real carrier[9];
     real turn[3];
     real shift[3];
-    real turned[6];
+    real G[6];
     real change[6];
     real e_c[6];
-    real seen[6];
+    real row_load[6];
     real known[6];
     real d_hinge_R[9];
     real d_hinge_d[3];
@@ -4760,7 +4760,7 @@ static int mstmm_at_known_carried(mstmm_state *state, int index)
     int columns[6];
     const int speeds = mstmm_free_speeds(state->memory, body, columns);
     int code;
-    if (mstmm_aside(state->model, state->observed, index)) return 0;
+    if (mstmm_omitted(state->model, state->observed, index)) return 0;
     if (body->section) {
         real *block = state->workspace + body->block;
         const int nu = body->nu;
@@ -4773,7 +4773,7 @@ static int mstmm_at_known_carried(mstmm_state *state, int index)
             .motion = block + MSTMM_BLOCK_MOTION, .Q = carrier);
         code = mstmm_at_section_motion_slope(state, index);
         if (code) return code;
-        mstmm_frames_tangent_turned(
+        mstmm_frames_tangent_pose_change(
             .R = block + MSTMM_BLOCK_HINGE_R, .d_R = d_block + MSTMM_BLOCK_HINGE_R,
             .d_d = d_block + MSTMM_BLOCK_HINGE_D, .theta = turn, .x = shift);
         mstmm_generic_tangent_column(nu,
@@ -4784,7 +4784,7 @@ static int mstmm_at_known_carried(mstmm_state *state, int index)
             .d_v = d_block + MSTMM_BLOCK_HINGE_V, .d_w = d_block + MSTMM_BLOCK_HINGE_W,
             .d_c = d_block + MSTMM_BLOCK_HINGE_C, .d_s = state->slope->given + body->u,
             .J = body->rotor, .laws = mstmm_zeros,
-            .B = tangent + MSTMM_TANGENT_KNOWN(body->nu, body->nq), .G = turned, .row = change);
+            .B = tangent + MSTMM_TANGENT_KNOWN(body->nu, body->nq), .G = G, .row = change);
     }
     if (body->section && body->placed) {
         real *block = state->workspace + body->block;
@@ -4820,7 +4820,7 @@ static int mstmm_at_known_carried(mstmm_state *state, int index)
         real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
         real *d_block = state->slope->workspace + body->block;
         real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
-        mstmm_tangent_push(
+        mstmm_tangent_column_load(
             .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .V = bend + MSTMM_BEND_V(n),
             .D = bend + MSTMM_BEND_D(n), .e = d_block + MSTMM_BLOCK_E,
             .e_f = d_modes + MSTMM_MODES_E_F(n), .rest = bend + MSTMM_BEND_REST(n),
@@ -4833,8 +4833,8 @@ static int mstmm_at_known_carried(mstmm_state *state, int index)
         real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
         real *d_block = state->slope->workspace + body->block;
         real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
-        mstmm_tangent_push(
-            .n = modal->n, .H = bend + MSTMM_BEND_STILL(n), .V = bend + MSTMM_BEND_V(n),
+        mstmm_tangent_column_load(
+            .n = modal->n, .H = bend + MSTMM_BEND_ZERO_H(n), .V = bend + MSTMM_BEND_V(n),
             .D = bend + MSTMM_BEND_D(n), .e = d_block + MSTMM_BLOCK_E,
             .e_f = d_modes + MSTMM_MODES_E_F(n), .rest = bend + MSTMM_BEND_REST(n),
             .y = bend + MSTMM_BEND_Y(n), .e_c = e_c, .work = bend + MSTMM_BEND_WORK(n));
@@ -4842,16 +4842,16 @@ static int mstmm_at_known_carried(mstmm_state *state, int index)
     }
     if (body->section) {
         real *tangent = state->tangents->numbers + body->tangent;
-        mstmm_frames_tangent_known(
+        mstmm_frames_tangent_known_load(
             .S = state->tangents->numbers + mstmm_carried_at(state->tangents, body),
-            .b = tangent + MSTMM_TANGENT_KNOWN(body->nu, body->nq), .g = turned, .e_S = seen,
+            .b = tangent + MSTMM_TANGENT_KNOWN(body->nu, body->nq), .g = G, .e_S = row_load,
             .e_b = known);
     }
     if (body->section && body->placed) {
         real *place = state->tangents->numbers + body->place;
-        mstmm_frames_placed_known(
+        mstmm_frames_placed_known_load(
             .S_p = place + MSTMM_PLACE_S(body->nu, body->nq),
-            .b_p = place + MSTMM_PLACE_KNOWN(body->nu, body->nq), .e_S = seen, .e_b = known);
+            .b_p = place + MSTMM_PLACE_KNOWN(body->nu, body->nq), .e_S = row_load, .e_b = known);
     }
     if (body->section && !body->section->inward) {
         const mstmm_modal *modal = mstmm_modal_of(body);
@@ -4861,14 +4861,14 @@ static int mstmm_at_known_carried(mstmm_state *state, int index)
         real *d_block = state->slope->workspace + body->block;
         real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
         for (int j = 0; j < 6; j++)
-            (d_block + MSTMM_BLOCK_E)[j] += seen[j];
+            (d_block + MSTMM_BLOCK_E)[j] += row_load[j];
         mstmm_modal_modal_effort(
             .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .e = d_block + MSTMM_BLOCK_E,
             .e_f = d_modes + MSTMM_MODES_E_F(n), .tau = d_modes + MSTMM_MODES_RIGHT(n));
         for (int j = 0; j < n; j++)
             (d_modes + MSTMM_MODES_E_F(n))[j] = (d_modes + MSTMM_MODES_RIGHT(n))[j];
         for (int j = 0; j < 6; j++)
-            (d_block + MSTMM_BLOCK_E)[j] += turned[j];
+            (d_block + MSTMM_BLOCK_E)[j] += G[j];
     }
     if (body->modal && body->section) {
         real *d_block = state->slope->workspace + body->block;
@@ -4908,13 +4908,13 @@ static int mstmm_at_known_carried(mstmm_state *state, int index)
     if (!body->section && speeds && body->straight) {
         real *block = state->workspace + body->block;
         const int nu = body->nu;
-        mstmm_generic_tangent_along(nu,
+        mstmm_generic_tangent_coordinate_change(nu,
             .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H), .d_q = state->slope->q + body->q,
             .theta = turn, .x = shift);
     }
     if (!body->section && speeds && !body->straight) {
         real *block = state->workspace + body->block;
-        mstmm_frames_tangent_turned(
+        mstmm_frames_tangent_pose_change(
             .R = block + MSTMM_BLOCK_HINGE_R, .d_R = d_hinge_R, .d_d = d_hinge_d, .theta = turn,
             .x = shift);
     }
@@ -4923,12 +4923,12 @@ static int mstmm_at_known_carried(mstmm_state *state, int index)
         const int nu = body->nu;
         real *tangent = state->tangents->numbers + body->tangent;
         real *d_block = state->slope->workspace + body->block;
-        mstmm_generic_tangent_turning(nu,
+        mstmm_generic_tangent_rotational(nu,
             .theta = turn, .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
             .w = block + MSTMM_BLOCK_HINGE_W, .Q = carrier, .f = block + MSTMM_BLOCK_E,
             .d_u = state->slope->u + body->u, .d_s = state->slope->given + body->u,
             .J = body->rotor, .laws = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU),
-            .B = tangent + MSTMM_TANGENT_KNOWN(body->nu, body->nq), .G = turned, .row = change);
+            .B = tangent + MSTMM_TANGENT_KNOWN(body->nu, body->nq), .G = G, .row = change);
     }
     if (!body->section && speeds && body->steady && !body->turning) {
         real *block = state->workspace + body->block;
@@ -4941,7 +4941,7 @@ static int mstmm_at_known_carried(mstmm_state *state, int index)
             .f = block + MSTMM_BLOCK_E, .d_u = state->slope->u + body->u,
             .d_s = state->slope->given + body->u, .J = body->rotor,
             .laws = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU),
-            .B = tangent + MSTMM_TANGENT_KNOWN(body->nu, body->nq), .G = turned, .row = change);
+            .B = tangent + MSTMM_TANGENT_KNOWN(body->nu, body->nq), .G = G, .row = change);
     }
     if (!body->section && speeds && !body->steady) {
         real *block = state->workspace + body->block;
@@ -4955,7 +4955,7 @@ static int mstmm_at_known_carried(mstmm_state *state, int index)
             .d_H = d_hinge_H, .d_v = d_hinge_v, .d_w = d_hinge_w, .d_c = d_hinge_c,
             .d_s = state->slope->given + body->u, .J = body->rotor,
             .laws = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU),
-            .B = tangent + MSTMM_TANGENT_KNOWN(body->nu, body->nq), .G = turned, .row = change);
+            .B = tangent + MSTMM_TANGENT_KNOWN(body->nu, body->nq), .G = G, .row = change);
     }
     if (!body->section && speeds && body->placed) {
         real *block = state->workspace + body->block;
@@ -4969,23 +4969,23 @@ static int mstmm_at_known_carried(mstmm_state *state, int index)
         real *tangent = state->tangents->numbers + body->tangent;
         for (int k = 0; k < speeds; k++)
             rows[k] = change[columns[k]];
-        mstmm_frames_tangent_known(
+        mstmm_frames_tangent_known_load(
             .S = state->tangents->numbers + mstmm_carried_at(state->tangents, body),
-            .b = tangent + MSTMM_TANGENT_KNOWN(body->nu, body->nq), .g = turned, .e_S = seen,
+            .b = tangent + MSTMM_TANGENT_KNOWN(body->nu, body->nq), .g = G, .e_S = row_load,
             .e_b = known);
     }
     if (!body->section && speeds && body->placed) {
         real *place = state->tangents->numbers + body->place;
-        mstmm_frames_placed_known(
+        mstmm_frames_placed_known_load(
             .S_p = place + MSTMM_PLACE_S(body->nu, body->nq),
-            .b_p = place + MSTMM_PLACE_KNOWN(body->nu, body->nq), .e_S = seen, .e_b = known);
+            .b_p = place + MSTMM_PLACE_KNOWN(body->nu, body->nq), .e_S = row_load, .e_b = known);
     }
     if (!body->section && speeds) {
         real *block = state->workspace + body->block;
         real *tangent = state->tangents->numbers + body->tangent;
         real *d_block = state->slope->workspace + body->block;
         real *d_parent = mstmm_block(state->model, state->slope->workspace, body->parent);
-        mstmm_generic_tangent_push_known(speeds,
+        mstmm_generic_tangent_load_with_increments(speeds,
             .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
             .H = tangent + MSTMM_TANGENT_H(body->nu, body->nq),
             .V = tangent + MSTMM_TANGENT_V(body->nu, body->nq),
@@ -5004,7 +5004,7 @@ static int mstmm_at_known_carried(mstmm_state *state, int index)
 }
 
 /* Solution for a right-hand side with known increments. */
-static int mstmm_at_known_answered(mstmm_state *state, int index)
+static int mstmm_at_increment_forward(mstmm_state *state, int index)
 {
     real x[6];
     real p[9];
@@ -5013,13 +5013,13 @@ static int mstmm_at_known_answered(mstmm_state *state, int index)
     const int nu = body->nu;
     int columns[6];
     const int speeds = mstmm_free_speeds(state->memory, body, columns);
-    if (mstmm_aside(state->model, state->observed, index)) return 0;
+    if (mstmm_omitted(state->model, state->observed, index)) return 0;
     mstmm_set_zero(state->answer + body->u, nu);
     if (body->placed) {
         real *block = state->workspace + body->block;
         real *place = state->tangents->numbers + body->place;
         real *d_parent = mstmm_block(state->model, state->slope->workspace, body->parent);
-        mstmm_frames_placed_moved(
+        mstmm_frames_placed_displacement(
             .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
             .z_I = d_parent + MSTMM_BLOCK_MOTION,
             .p_I = state->tangents->numbers + mstmm_place_at(state->model, body->parent) + MSTMM_PLACE_Z(0, 0),
@@ -5030,7 +5030,7 @@ static int mstmm_at_known_answered(mstmm_state *state, int index)
         real *place = state->tangents->numbers + body->place;
         for (int j = 0; j < 9; j++)
             (place + MSTMM_PLACE_Z(body->nu, body->nq))[j] += (place + MSTMM_PLACE_KNOWN(body->nu, body->nq))[j];
-        mstmm_tangent_placed_left(
+        mstmm_tangent_placed_remainder(
             .n = speeds, .gain = place + MSTMM_PLACE_GAIN(body->nu, body->nq),
             .p = place + MSTMM_PLACE_Z(body->nu, body->nq),
             .y = tangent + MSTMM_TANGENT_Y(body->nu, body->nq));
@@ -5041,7 +5041,7 @@ static int mstmm_at_known_answered(mstmm_state *state, int index)
         real *tangent = state->tangents->numbers + body->tangent;
         real *d_block = state->slope->workspace + body->block;
         real *d_parent = mstmm_block(state->model, state->slope->workspace, body->parent);
-        mstmm_generic_tangent_answer_known(speeds,
+        mstmm_generic_tangent_solution_with_increments(speeds,
             .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
             .w_I = parent + MSTMM_BLOCK_MOTION, .v = block + MSTMM_BLOCK_HINGE_V,
             .w = block + MSTMM_BLOCK_HINGE_W, .z_I = d_parent + MSTMM_BLOCK_MOTION,
@@ -5056,7 +5056,7 @@ static int mstmm_at_known_answered(mstmm_state *state, int index)
     }
     if (!body->section && speeds && body->placed) {
         real *place = state->tangents->numbers + body->place;
-        mstmm_tangent_displaced(
+        mstmm_tangent_port_motion(
             .n = speeds, .B = place + MSTMM_PLACE_B(body->nu, body->nq), .x = x,
             .z_c = place + MSTMM_PLACE_Z(body->nu, body->nq), .z = p);
         memcpy(place + MSTMM_PLACE_Z(body->nu, body->nq), p, 9 * sizeof(real));
@@ -5066,7 +5066,7 @@ static int mstmm_at_known_answered(mstmm_state *state, int index)
         real *parent = mstmm_block(state->model, state->workspace, body->parent);
         real *d_block = state->slope->workspace + body->block;
         real *d_parent = mstmm_block(state->model, state->slope->workspace, body->parent);
-        mstmm_frames_tangent_moved(
+        mstmm_frames_tangent_motion(
             .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
             .w_I = parent + MSTMM_BLOCK_MOTION, .v = block + MSTMM_BLOCK_HINGE_V,
             .w = block + MSTMM_BLOCK_HINGE_W, .z_I = d_parent + MSTMM_BLOCK_MOTION,
@@ -5089,7 +5089,7 @@ static int mstmm_at_known_answered(mstmm_state *state, int index)
         const mstmm_section *section = body->section;
         real *port = section ? state->tangents->numbers + section->tangent : NULL;
         real *d_block = state->slope->workspace + body->block;
-        mstmm_tangent_displaced(
+        mstmm_tangent_port_motion(
             .n = modal->n, .B = port + MSTMM_PORT_B(n), .x = state->answer + modal->u,
             .z_c = d_block + MSTMM_BLOCK_MOTION, .z = z);
         memcpy(d_block + MSTMM_BLOCK_MOTION, z, 9 * sizeof(real));
@@ -5100,7 +5100,7 @@ static int mstmm_at_known_answered(mstmm_state *state, int index)
         const int n = mstmm_modes_of(modal);
         const mstmm_section *section = body->section;
         real *port = section ? state->tangents->numbers + section->tangent : NULL;
-        mstmm_tangent_displaced(
+        mstmm_tangent_port_motion(
             .n = modal->n, .B = port + MSTMM_PORT_PLACE_B(n), .x = state->answer + modal->u,
             .z_c = place + MSTMM_PLACE_Z(body->nu, body->nq), .z = p);
         memcpy(place + MSTMM_PLACE_Z(body->nu, body->nq), p, 9 * sizeof(real));
@@ -5110,7 +5110,7 @@ static int mstmm_at_known_answered(mstmm_state *state, int index)
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
         real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
-        mstmm_tangent_placed_left(
+        mstmm_tangent_placed_remainder(
             .n = modal->n, .gain = bend + MSTMM_BEND_PLACE_GAIN(n),
             .p = place + MSTMM_PLACE_Z(body->nu, body->nq), .y = bend + MSTMM_BEND_Y(n));
     }
@@ -5119,7 +5119,7 @@ static int mstmm_at_known_answered(mstmm_state *state, int index)
         const int n = mstmm_modes_of(modal);
         real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
         real *d_block = state->slope->workspace + body->block;
-        mstmm_tangent_answer(
+        mstmm_tangent_column_solution(
             .n = modal->n, .B = bend + MSTMM_BEND_B(n), .gain = bend + MSTMM_BEND_GAIN(n),
             .y = bend + MSTMM_BEND_Y(n), .z_c = d_block + MSTMM_BLOCK_MOTION,
             .x = state->answer + modal->u, .z = z);
@@ -5130,7 +5130,7 @@ static int mstmm_at_known_answered(mstmm_state *state, int index)
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
         real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
-        mstmm_tangent_displaced(
+        mstmm_tangent_port_motion(
             .n = modal->n, .B = bend + MSTMM_BEND_PLACE_B(n), .x = state->answer + modal->u,
             .z_c = place + MSTMM_PLACE_Z(body->nu, body->nq), .z = p);
         memcpy(place + MSTMM_PLACE_Z(body->nu, body->nq), p, 9 * sizeof(real));
@@ -5166,7 +5166,7 @@ static int mstmm_at_laws_own(mstmm_state *state, int index)
             (bend + MSTMM_BEND_V(n))[j] = (modes + MSTMM_MODES_S_RF(n))[j];
         for (int j = 0; j < n * n; j++)
             (bend + MSTMM_BEND_D(n))[j] = (modes + MSTMM_MODES_S_FF(n))[j];
-        mstmm_modal_stiffened(
+        mstmm_modal_step_stiffness(
             .n = modal->n, .K = modal->stiffness, .D = modal->damping,
             .rate = &state->tangents->rate, .sq = &state->tangents->sq,
             .S_ff = bend + MSTMM_BEND_D(n));
@@ -5309,7 +5309,7 @@ static int mstmm_at_laws_factorise(mstmm_state *state, int index)
         real *port = section ? state->tangents->numbers + section->tangent : NULL;
         real *d_block = state->slope->workspace + body->block;
         real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
-        mstmm_modal_absorb(
+        mstmm_modal_assemble_port(
             .n = modal->n, .Rc = block + MSTMM_BLOCK_HINGE_R, .r = block + MSTMM_BLOCK_HINGE_D,
             .H = laid + MSTMM_SECTION_H(n),
             .S = state->tangents->numbers + mstmm_carried_at(state->tangents, body),
@@ -5362,15 +5362,15 @@ static int mstmm_at_modes_change(mstmm_state *state, int index)
     const int n = mstmm_modes_of(modal);
     real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
     if (!body->modal) return 0;
-    mstmm_modal_strained(
+    mstmm_modal_strain_load(
         .n = modal->n, .K = modal->stiffness, .D = modal->damping,
         .eta = state->slope->q + modal->q, .etad = state->slope->u + modal->u,
         .e_f = d_modes + MSTMM_MODES_E_F(n));
     return 0;
 }
 
-/* Load of the right-hand side carried across the hinge to the parent. */
-static int mstmm_at_laws_column_carried(mstmm_state *state, int index)
+/* Load of the right-hand side carried to the parent. */
+static int mstmm_at_laws_column_backward(mstmm_state *state, int index)
 {
     real e_c[6];
     real hinge_tau_free[6];
@@ -5400,7 +5400,7 @@ static int mstmm_at_laws_column_carried(mstmm_state *state, int index)
         const int n = mstmm_modes_of(modal);
         real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
         real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
-        mstmm_modal_pushed(
+        mstmm_modal_column_load(
             .n = modal->n, .Gg = bend + MSTMM_BEND_GAIN(n), .e = d_block + MSTMM_BLOCK_E,
             .e_f = d_modes + MSTMM_MODES_E_F(n), .e_c = e_c);
         memcpy(d_block + MSTMM_BLOCK_E, e_c, 6 * sizeof(real));
@@ -5419,7 +5419,7 @@ static int mstmm_at_laws_column_carried(mstmm_state *state, int index)
     }
     for (int k = 0; k < speeds; k++)
         hinge_tau_free[k] = (mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU))[columns[k]];
-    mstmm_generic_push(speeds,
+    mstmm_generic_column_load(speeds,
         .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
         .H = tangent + MSTMM_TANGENT_H(body->nu, body->nq),
         .G = tangent + MSTMM_TANGENT_V(body->nu, body->nq), .e = d_block + MSTMM_BLOCK_E,
@@ -5429,7 +5429,7 @@ static int mstmm_at_laws_column_carried(mstmm_state *state, int index)
 }
 
 /* Accelerations due to the right-hand side. */
-static int mstmm_at_laws_column_answered(mstmm_state *state, int index)
+static int mstmm_at_laws_column_forward(mstmm_state *state, int index)
 {
     real delta[6];
     const mstmm_body *body = &state->model->bodies[index];
@@ -5441,7 +5441,7 @@ static int mstmm_at_laws_column_answered(mstmm_state *state, int index)
     real *d_block = state->slope->workspace + body->block;
     real *d_parent = mstmm_block(state->model, state->slope->workspace, body->parent);
     if (mstmm_idle(state->observed, body)) return 0;
-    mstmm_generic_answer(speeds,
+    mstmm_generic_column_acceleration(speeds,
         .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
         .H = tangent + MSTMM_TANGENT_H(body->nu, body->nq),
         .F = tangent + MSTMM_TANGENT_GAIN(body->nu, body->nq),
@@ -5458,7 +5458,7 @@ static int mstmm_at_laws_column_answered(mstmm_state *state, int index)
         const int n = mstmm_modes_of(modal);
         real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
         real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
-        mstmm_modal_answer(
+        mstmm_modal_column_acceleration(
             .n = modal->n, .S_ff = bend + MSTMM_BEND_D(n), .e_f = d_modes + MSTMM_MODES_E_F(n),
             .Gg = bend + MSTMM_BEND_GAIN(n), .delta_I = d_block + MSTMM_BLOCK_DELTA,
             .y = d_modes + MSTMM_MODES_RIGHT(n), .etadd = d_modes + MSTMM_MODES_ETADD(n),
@@ -5472,7 +5472,7 @@ static int mstmm_at_laws_column_answered(mstmm_state *state, int index)
         const mstmm_section *section = body->section;
         real *laid = section ? state->workspace + section->place : NULL;
         real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
-        mstmm_modal_displaced(
+        mstmm_modal_port_deviation(
             .n = modal->n, .H = laid + MSTMM_SECTION_H(n),
             .etadd = d_modes + MSTMM_MODES_ETADD(n), .delta_I = d_block + MSTMM_BLOCK_DELTA,
             .delta = delta);
@@ -5482,7 +5482,7 @@ static int mstmm_at_laws_column_answered(mstmm_state *state, int index)
 }
 
 /* Inertia of a body and its outboard part, carried to the parent. */
-static int mstmm_at_composed(mstmm_state *state, int index)
+static int mstmm_at_composite_inertia(mstmm_state *state, int index)
 {
     real unused_G[36];
     real unused_g[6];
@@ -5521,13 +5521,13 @@ int mstmm_at_momentum(mstmm_state *state, int index, real *given_S, real *given_
         .Y_z = modal->moments.y[2], .G_x = modal->moments.g[0], .G_y = modal->moments.g[1],
         .G_z = modal->moments.g[2], .M = modal->moments.m, .eta = state->q + modal->q,
         .etad = state->u + modal->u, .v = block + MSTMM_BLOCK_V, .w = block + MSTMM_BLOCK_MOTION,
-        .S = given_S, .S_rf = modes + MSTMM_MODES_BASED(n), .A = modes + MSTMM_MODES_A(n),
+        .S = given_S, .S_rf = modes + MSTMM_MODES_S_RF_I(n), .A = modes + MSTMM_MODES_A(n),
         .h = given_h, .h_f = modes + MSTMM_MODES_RIGHT(n), .T = given_T);
     return 0;
 }
 
 /* Change of the coordinates of a hinge by that of its speeds. */
-int mstmm_at_lagged(mstmm_state *state, int index)
+int mstmm_at_coordinate_increment(mstmm_state *state, int index)
 {
     const mstmm_body *body = &state->model->bodies[index];
     const int nq = body->nq;
@@ -5537,8 +5537,8 @@ int mstmm_at_lagged(mstmm_state *state, int index)
     if (code) return code;
     for (int j = 0; j < nq; j++)
         (state->slope->qdot + body->q)[j] += (state->tangents->rho + body->q)[j];
-    mstmm_tangent_lagged(
-        .n = nq, .Q = tangent + MSTMM_TANGENT_LAG(body->nu, body->nq),
+    mstmm_tangent_coordinate_increment(
+        .n = nq, .Q = tangent + MSTMM_TANGENT_Q(body->nu, body->nq),
         .rate = state->slope->qdot + body->q, .dq = state->tangents->change + body->q);
     return 0;
 }
@@ -5559,19 +5559,19 @@ int mstmm_at_rates_change(mstmm_state *state, int index)
 }
 
 /* Load of the outboard part at the given accelerations of the hinge. */
-int mstmm_at_exerted(mstmm_state *state, int index)
+int mstmm_at_outboard_load(mstmm_state *state, int index)
 {
     const mstmm_body *body = &state->model->bodies[index];
     real *block = state->workspace + body->block;
     const int nu = body->nu;
-    mstmm_generic_exerted(nu,
+    mstmm_generic_required_load(nu,
         .S = block + MSTMM_BLOCK_S, .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
         .udot = state->given + body->u, .e = block + MSTMM_BLOCK_E);
     return 0;
 }
 
 /* Efforts of a load along the speeds of one hinge, and the load on the parent. */
-int mstmm_at_felt_by(mstmm_state *state, int index)
+int mstmm_at_hinge_efforts(mstmm_state *state, int index)
 {
     real tau[6];
     const mstmm_body *body = &state->model->bodies[index];
@@ -5582,7 +5582,7 @@ int mstmm_at_felt_by(mstmm_state *state, int index)
         .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H), .f = block + MSTMM_BLOCK_E, .tau = tau);
     for (int k = 0; k < body->nu; k++) {
         mstmm_frames_driven_effort(
-            .felt = tau + k, .J = body->rotor + k, .udot = state->given + body->u + k,
+            .load = tau + k, .J = body->rotor + k, .udot = state->given + body->u + k,
             .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k,
             .tau_d = state->required + body->u + k);
     }
@@ -5592,14 +5592,14 @@ int mstmm_at_felt_by(mstmm_state *state, int index)
     return 0;
 }
 
-static int mstmm_pass_prescribed(mstmm_state *state)
+static int mstmm_pass_prescribed_accelerations(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int k = 0; k < model->n_runs; k++) {
         const mstmm_branch *run = &model->runs[k];
         if (run->numbers && state->linked) continue;
         for (int i = run->first; i < run->first + run->count; i++) {
-            const int code = mstmm_at_prescribed(state, i);
+            const int code = mstmm_at_prescribed_accelerations(state, i);
             if (code) return code;
         }
     }
@@ -5691,7 +5691,7 @@ static int mstmm_pass_laws(mstmm_state *state)
     return 0;
 }
 
-MSTMM_AT_ONCE void mstmm_fetch_restated(const mstmm_state *state, int index, int ahead)
+MSTMM_AT_ONCE void mstmm_fetch_rotor_residual(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
     if (!body) return;
@@ -5699,18 +5699,18 @@ MSTMM_AT_ONCE void mstmm_fetch_restated(const mstmm_state *state, int index, int
     const int nu = body->nu;
     mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_S), mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + nu);
 }
-static int mstmm_pass_restated(mstmm_state *state)
+static int mstmm_pass_rotor_residual(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = 0; i < model->n_bodies; i++) {
-        if (mstmm_beyond_cache(model)) mstmm_fetch_restated(state, i, MSTMM_TILE);
-        const int code = mstmm_at_restated(state, i);
+        if (mstmm_beyond_cache(model)) mstmm_fetch_rotor_residual(state, i, MSTMM_TILE);
+        const int code = mstmm_at_rotor_residual(state, i);
         if (code) return code;
     }
     return 0;
 }
 
-MSTMM_AT_ONCE void mstmm_fetch_restated_of_tree(const mstmm_state *state, int index, int ahead)
+MSTMM_AT_ONCE void mstmm_fetch_rotor_residual_of_tree(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
     if (!body) return;
@@ -5718,12 +5718,12 @@ MSTMM_AT_ONCE void mstmm_fetch_restated_of_tree(const mstmm_state *state, int in
     const int nu = body->nu;
     mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_S), mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + nu);
 }
-static int mstmm_pass_restated_of_tree(mstmm_state *state)
+static int mstmm_pass_rotor_residual_of_tree(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = 0; i < model->n_bodies; i++) {
-        if (mstmm_beyond_cache(model)) mstmm_fetch_restated_of_tree(state, i, MSTMM_TILE);
-        const int code = mstmm_at_restated_of_tree(state, i);
+        if (mstmm_beyond_cache(model)) mstmm_fetch_rotor_residual_of_tree(state, i, MSTMM_TILE);
+        const int code = mstmm_at_rotor_residual_of_tree(state, i);
         if (code) return code;
     }
     return 0;
@@ -5888,7 +5888,7 @@ static int mstmm_pass_closures(mstmm_state *state)
     return 0;
 }
 
-MSTMM_AT_ONCE void mstmm_fetch_carried(const mstmm_state *state, int index, int ahead)
+MSTMM_AT_ONCE void mstmm_fetch_condense_with_rows(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
     if (!body) return;
@@ -5900,38 +5900,38 @@ MSTMM_AT_ONCE void mstmm_fetch_carried(const mstmm_state *state, int index, int 
     mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU), mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE) + 6 * nu);
     mstmm_fetch(body->rotor, body->hinge_p);
 }
-static int mstmm_pass_carried(mstmm_state *state)
+static int mstmm_pass_condense_with_rows(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = model->n_bodies - 1; i >= 0; i--) {
-        if (mstmm_beyond_cache(model)) mstmm_fetch_carried(state, i, -MSTMM_TILE);
-        const int code = mstmm_at_carried(state, i);
+        if (mstmm_beyond_cache(model)) mstmm_fetch_condense_with_rows(state, i, -MSTMM_TILE);
+        const int code = mstmm_at_condense_with_rows(state, i);
         if (code) return code;
     }
     return 0;
 }
 
-static int mstmm_pass_row_closed(mstmm_state *state)
+static int mstmm_pass_row_elimination(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = model->first_ground_row; i < model->n_rows; i++) {
-        const int code = mstmm_at_row_closed(state, i);
+        const int code = mstmm_at_row_elimination(state, i);
         if (code) return code;
     }
     return 0;
 }
 
-static int mstmm_pass_row_found(mstmm_state *state)
+static int mstmm_pass_row_multiplier(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = model->n_rows - 1; i >= model->first_ground_row; i--) {
-        const int code = mstmm_at_row_found(state, i);
+        const int code = mstmm_at_row_multiplier(state, i);
         if (code) return code;
     }
     return 0;
 }
 
-MSTMM_AT_ONCE void mstmm_fetch_answered(const mstmm_state *state, int index, int ahead)
+MSTMM_AT_ONCE void mstmm_fetch_recover_with_rows(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
     if (!body) return;
@@ -5941,18 +5941,18 @@ MSTMM_AT_ONCE void mstmm_fetch_answered(const mstmm_state *state, int index, int
     mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
     mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_S), mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE) + 6 * nu);
 }
-static int mstmm_pass_answered(mstmm_state *state)
+static int mstmm_pass_recover_with_rows(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = 0; i < model->n_bodies; i++) {
-        if (mstmm_beyond_cache(model)) mstmm_fetch_answered(state, i, MSTMM_TILE);
-        const int code = mstmm_at_answered(state, i);
+        if (mstmm_beyond_cache(model)) mstmm_fetch_recover_with_rows(state, i, MSTMM_TILE);
+        const int code = mstmm_at_recover_with_rows(state, i);
         if (code) return code;
     }
     return 0;
 }
 
-MSTMM_AT_ONCE void mstmm_fetch_closures_answered(const mstmm_state *state, int index, int ahead)
+MSTMM_AT_ONCE void mstmm_fetch_closure_accelerations(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
     if (!body) return;
@@ -5961,12 +5961,12 @@ MSTMM_AT_ONCE void mstmm_fetch_closures_answered(const mstmm_state *state, int i
     mstmm_fetch(block + MSTMM_BLOCK_E, block + MSTMM_BLOCK_E + 6);
     mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_S), mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + nu);
 }
-static int mstmm_pass_closures_answered(mstmm_state *state)
+static int mstmm_pass_closure_accelerations(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = 0; i < model->n_bodies; i++) {
-        if (mstmm_beyond_cache(model)) mstmm_fetch_closures_answered(state, i, MSTMM_TILE);
-        const int code = mstmm_at_closures_answered(state, i);
+        if (mstmm_beyond_cache(model)) mstmm_fetch_closure_accelerations(state, i, MSTMM_TILE);
+        const int code = mstmm_at_closure_accelerations(state, i);
         if (code) return code;
     }
     return 0;
@@ -5993,11 +5993,11 @@ static int mstmm_pass_drive_power(mstmm_state *state)
     return 0;
 }
 
-static int mstmm_pass_couplings_answered(mstmm_state *state)
+static int mstmm_pass_coupling_multipliers(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = 0; i < model->n_couplings; i++) {
-        const int code = mstmm_at_couplings_answered(state, i);
+        const int code = mstmm_at_coupling_multipliers(state, i);
         if (code) return code;
     }
     return 0;
@@ -6023,47 +6023,47 @@ static int mstmm_pass_forces_in_plane(mstmm_state *state)
     return 0;
 }
 
-static int mstmm_pass_carried_in_plane(mstmm_state *state)
+static int mstmm_pass_condense_with_rows_in_plane(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = model->n_bodies - 1; i >= 0; i--) {
-        const int code = mstmm_at_carried_in_plane(state, i);
+        const int code = mstmm_at_condense_with_rows_in_plane(state, i);
         if (code) return code;
     }
     return 0;
 }
 
-static int mstmm_pass_row_closed_in_plane(mstmm_state *state)
+static int mstmm_pass_row_elimination_in_plane(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = model->first_ground_row; i < model->n_rows; i++) {
-        const int code = mstmm_at_row_closed_in_plane(state, i);
+        const int code = mstmm_at_row_elimination_in_plane(state, i);
         if (code) return code;
     }
     return 0;
 }
 
-static int mstmm_pass_row_found_in_plane(mstmm_state *state)
+static int mstmm_pass_row_multiplier_in_plane(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = model->n_rows - 1; i >= model->first_ground_row; i--) {
-        const int code = mstmm_at_row_found_in_plane(state, i);
+        const int code = mstmm_at_row_multiplier_in_plane(state, i);
         if (code) return code;
     }
     return 0;
 }
 
-static int mstmm_pass_couplings_loaded(mstmm_state *state)
+static int mstmm_pass_coupling_loads(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = 0; i < model->n_bodies; i++) {
-        const int code = mstmm_at_couplings_loaded(state, i);
+        const int code = mstmm_at_coupling_loads(state, i);
         if (code) return code;
     }
     return 0;
 }
 
-MSTMM_AT_ONCE void mstmm_fetch_closures_loaded(const mstmm_state *state, int index, int ahead)
+MSTMM_AT_ONCE void mstmm_fetch_closure_loads(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
     if (!body) return;
@@ -6073,18 +6073,18 @@ MSTMM_AT_ONCE void mstmm_fetch_closures_loaded(const mstmm_state *state, int ind
     mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
     mstmm_fetch(block + MSTMM_BLOCK_MOTION, mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
 }
-static int mstmm_pass_closures_loaded(mstmm_state *state)
+static int mstmm_pass_closure_loads(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = 0; i < model->n_bodies; i++) {
-        if (mstmm_beyond_cache(model)) mstmm_fetch_closures_loaded(state, i, MSTMM_TILE);
-        const int code = mstmm_at_closures_loaded(state, i);
+        if (mstmm_beyond_cache(model)) mstmm_fetch_closure_loads(state, i, MSTMM_TILE);
+        const int code = mstmm_at_closure_loads(state, i);
         if (code) return code;
     }
     return 0;
 }
 
-MSTMM_AT_ONCE void mstmm_fetch_required(const mstmm_state *state, int index, int ahead)
+MSTMM_AT_ONCE void mstmm_fetch_required_efforts(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
     if (!body) return;
@@ -6095,18 +6095,18 @@ MSTMM_AT_ONCE void mstmm_fetch_required(const mstmm_state *state, int index, int
     mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU), mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
     mstmm_fetch(body->hinge_p, body->body_p);
 }
-static int mstmm_pass_required(mstmm_state *state)
+static int mstmm_pass_required_efforts(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = model->n_bodies - 1; i >= 0; i--) {
-        if (mstmm_beyond_cache(model)) mstmm_fetch_required(state, i, -MSTMM_TILE);
-        const int code = mstmm_at_required(state, i);
+        if (mstmm_beyond_cache(model)) mstmm_fetch_required_efforts(state, i, -MSTMM_TILE);
+        const int code = mstmm_at_required_efforts(state, i);
         if (code) return code;
     }
     return 0;
 }
 
-MSTMM_AT_ONCE void mstmm_fetch_unloaded(const mstmm_state *state, int index, int ahead)
+MSTMM_AT_ONCE void mstmm_fetch_clear_loads(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
     if (!body) return;
@@ -6115,12 +6115,12 @@ MSTMM_AT_ONCE void mstmm_fetch_unloaded(const mstmm_state *state, int index, int
     mstmm_fetch(block + MSTMM_BLOCK_E, block + MSTMM_BLOCK_E + 6);
     mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU), mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + nu);
 }
-static int mstmm_pass_unloaded(mstmm_state *state)
+static int mstmm_pass_clear_loads(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = 0; i < model->n_bodies; i++) {
-        if (mstmm_beyond_cache(model)) mstmm_fetch_unloaded(state, i, MSTMM_TILE);
-        const int code = mstmm_at_unloaded(state, i);
+        if (mstmm_beyond_cache(model)) mstmm_fetch_clear_loads(state, i, MSTMM_TILE);
+        const int code = mstmm_at_clear_loads(state, i);
         if (code) return code;
     }
     return 0;
@@ -6147,7 +6147,7 @@ static int mstmm_pass_factorise(mstmm_state *state)
     return 0;
 }
 
-MSTMM_AT_ONCE void mstmm_fetch_column_answered(const mstmm_state *state, int index, int ahead)
+MSTMM_AT_ONCE void mstmm_fetch_column_forward(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
     if (!body) return;
@@ -6157,25 +6157,25 @@ MSTMM_AT_ONCE void mstmm_fetch_column_answered(const mstmm_state *state, int ind
     mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
     mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_H), mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE) + 6 * nu);
 }
-static int mstmm_pass_column_answered(mstmm_state *state)
+static int mstmm_pass_column_forward(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = 0; i < model->n_bodies; i++) {
-        if (mstmm_beyond_cache(model)) mstmm_fetch_column_answered(state, i, MSTMM_TILE);
-        const int code = mstmm_at_column_answered(state, i);
+        if (mstmm_beyond_cache(model)) mstmm_fetch_column_forward(state, i, MSTMM_TILE);
+        const int code = mstmm_at_column_forward(state, i);
         if (code) return code;
     }
     return 0;
 }
 
-static int mstmm_pass_prescribed_slope(mstmm_state *state)
+static int mstmm_pass_prescribed_accelerations_slope(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int k = 0; k < model->n_runs; k++) {
         const mstmm_branch *run = &model->runs[k];
         if (run->numbers && state->linked) continue;
         for (int i = run->first; i < run->first + run->count; i++) {
-            const int code = mstmm_at_prescribed_slope(state, i);
+            const int code = mstmm_at_prescribed_accelerations_slope(state, i);
             if (code) return code;
         }
     }
@@ -6240,11 +6240,11 @@ static int mstmm_pass_laws_slope(mstmm_state *state)
     return 0;
 }
 
-static int mstmm_pass_couplings_loaded_slope(mstmm_state *state)
+static int mstmm_pass_coupling_loads_slope(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = 0; i < model->n_bodies; i++) {
-        const int code = mstmm_at_couplings_loaded_slope(state, i);
+        const int code = mstmm_at_coupling_loads_slope(state, i);
         if (code) return code;
     }
     return 0;
@@ -6313,7 +6313,7 @@ static int mstmm_pass_forces_slope(mstmm_state *state)
     return 0;
 }
 
-MSTMM_AT_ONCE void mstmm_fetch_closures_loaded_slope(const mstmm_state *state, int index, int ahead)
+MSTMM_AT_ONCE void mstmm_fetch_closure_loads_slope(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
     if (!body) return;
@@ -6327,18 +6327,18 @@ MSTMM_AT_ONCE void mstmm_fetch_closures_loaded_slope(const mstmm_state *state, i
     mstmm_fetch(d_block + MSTMM_BLOCK_R, d_block + MSTMM_BLOCK_SHIFT + 3);
     mstmm_fetch(d_block + MSTMM_BLOCK_MOTION, mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H) + 6 * nu);
 }
-static int mstmm_pass_closures_loaded_slope(mstmm_state *state)
+static int mstmm_pass_closure_loads_slope(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = 0; i < model->n_bodies; i++) {
-        if (mstmm_beyond_cache(model)) mstmm_fetch_closures_loaded_slope(state, i, MSTMM_TILE);
-        const int code = mstmm_at_closures_loaded_slope(state, i);
+        if (mstmm_beyond_cache(model)) mstmm_fetch_closure_loads_slope(state, i, MSTMM_TILE);
+        const int code = mstmm_at_closure_loads_slope(state, i);
         if (code) return code;
     }
     return 0;
 }
 
-MSTMM_AT_ONCE void mstmm_fetch_required_slope(const mstmm_state *state, int index, int ahead)
+MSTMM_AT_ONCE void mstmm_fetch_required_efforts_slope(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
     if (!body) return;
@@ -6352,12 +6352,12 @@ MSTMM_AT_ONCE void mstmm_fetch_required_slope(const mstmm_state *state, int inde
     mstmm_fetch(d_block + MSTMM_BLOCK_E, d_block + MSTMM_BLOCK_E + 6);
     mstmm_fetch(mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU), mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H) + 6 * nu);
 }
-static int mstmm_pass_required_slope(mstmm_state *state)
+static int mstmm_pass_required_efforts_slope(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = model->n_bodies - 1; i >= 0; i--) {
-        if (mstmm_beyond_cache(model)) mstmm_fetch_required_slope(state, i, -MSTMM_TILE);
-        const int code = mstmm_at_required_slope(state, i);
+        if (mstmm_beyond_cache(model)) mstmm_fetch_required_efforts_slope(state, i, -MSTMM_TILE);
+        const int code = mstmm_at_required_efforts_slope(state, i);
         if (code) return code;
     }
     return 0;
@@ -6490,7 +6490,7 @@ static int mstmm_pass_tangent_condense(mstmm_state *state)
     return 0;
 }
 
-MSTMM_AT_ONCE void mstmm_fetch_tangent_brought(const mstmm_state *state, int index, int ahead)
+MSTMM_AT_ONCE void mstmm_fetch_tangent_contributions(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
     if (!body) return;
@@ -6503,12 +6503,12 @@ MSTMM_AT_ONCE void mstmm_fetch_tangent_brought(const mstmm_state *state, int ind
     mstmm_fetch(tangent + MSTMM_TANGENT_ALONG(body->nu, body->nq), tangent + MSTMM_TANGENT_ALONG(body->nu, body->nq) + nq * nu);
     mstmm_fetch(body->rotor, body->body_p);
 }
-static int mstmm_pass_tangent_brought(mstmm_state *state)
+static int mstmm_pass_tangent_contributions(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = 0; i < model->n_bodies; i++) {
-        if (mstmm_beyond_cache(model)) mstmm_fetch_tangent_brought(state, i, MSTMM_TILE);
-        const int code = mstmm_at_tangent_brought(state, i);
+        if (mstmm_beyond_cache(model)) mstmm_fetch_tangent_contributions(state, i, MSTMM_TILE);
+        const int code = mstmm_at_tangent_contributions(state, i);
         if (code) return code;
     }
     return 0;
@@ -6534,7 +6534,7 @@ static int mstmm_pass_tangent_column(mstmm_state *state)
     return 0;
 }
 
-MSTMM_AT_ONCE void mstmm_fetch_tangent_carried(const mstmm_state *state, int index, int ahead)
+MSTMM_AT_ONCE void mstmm_fetch_tangent_backward(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
     if (!body) return;
@@ -6548,18 +6548,18 @@ MSTMM_AT_ONCE void mstmm_fetch_tangent_carried(const mstmm_state *state, int ind
     mstmm_fetch(tangent + MSTMM_TANGENT_H(body->nu, body->nq), tangent + MSTMM_TANGENT_V(body->nu, body->nq) + 6 * nu);
     mstmm_fetch(tangent + MSTMM_TANGENT_INVERSE(body->nu, body->nq), tangent + MSTMM_TANGENT_Y(body->nu, body->nq) + nu);
 }
-static int mstmm_pass_tangent_carried(mstmm_state *state)
+static int mstmm_pass_tangent_backward(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = model->n_bodies - 1; i >= 0; i--) {
-        if (mstmm_beyond_cache(model)) mstmm_fetch_tangent_carried(state, i, -MSTMM_TILE);
-        const int code = mstmm_at_tangent_carried(state, i);
+        if (mstmm_beyond_cache(model)) mstmm_fetch_tangent_backward(state, i, -MSTMM_TILE);
+        const int code = mstmm_at_tangent_backward(state, i);
         if (code) return code;
     }
     return 0;
 }
 
-MSTMM_AT_ONCE void mstmm_fetch_tangent_answered(const mstmm_state *state, int index, int ahead)
+MSTMM_AT_ONCE void mstmm_fetch_tangent_forward(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
     if (!body) return;
@@ -6572,18 +6572,18 @@ MSTMM_AT_ONCE void mstmm_fetch_tangent_answered(const mstmm_state *state, int in
     mstmm_fetch(tangent + MSTMM_TANGENT_B(body->nu, body->nq), tangent + MSTMM_TANGENT_B(body->nu, body->nq) + 9 * nu);
     mstmm_fetch(tangent + MSTMM_TANGENT_GAIN(body->nu, body->nq), tangent + MSTMM_TANGENT_Y(body->nu, body->nq) + nu);
 }
-static int mstmm_pass_tangent_answered(mstmm_state *state)
+static int mstmm_pass_tangent_forward(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = 0; i < model->n_bodies; i++) {
-        if (mstmm_beyond_cache(model)) mstmm_fetch_tangent_answered(state, i, MSTMM_TILE);
-        const int code = mstmm_at_tangent_answered(state, i);
+        if (mstmm_beyond_cache(model)) mstmm_fetch_tangent_forward(state, i, MSTMM_TILE);
+        const int code = mstmm_at_tangent_forward(state, i);
         if (code) return code;
     }
     return 0;
 }
 
-MSTMM_AT_ONCE void mstmm_fetch_known_answered(const mstmm_state *state, int index, int ahead)
+MSTMM_AT_ONCE void mstmm_fetch_increment_forward(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
     if (!body) return;
@@ -6596,18 +6596,18 @@ MSTMM_AT_ONCE void mstmm_fetch_known_answered(const mstmm_state *state, int inde
     mstmm_fetch(tangent + MSTMM_TANGENT_B(body->nu, body->nq), tangent + MSTMM_TANGENT_B(body->nu, body->nq) + 9 * nu);
     mstmm_fetch(tangent + MSTMM_TANGENT_GAIN(body->nu, body->nq), tangent + MSTMM_TANGENT_KNOWN(body->nu, body->nq) + 9);
 }
-static int mstmm_pass_known_answered(mstmm_state *state)
+static int mstmm_pass_increment_forward(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = 0; i < model->n_bodies; i++) {
-        if (mstmm_beyond_cache(model)) mstmm_fetch_known_answered(state, i, MSTMM_TILE);
-        const int code = mstmm_at_known_answered(state, i);
+        if (mstmm_beyond_cache(model)) mstmm_fetch_increment_forward(state, i, MSTMM_TILE);
+        const int code = mstmm_at_increment_forward(state, i);
         if (code) return code;
     }
     return 0;
 }
 
-MSTMM_AT_ONCE void mstmm_fetch_laws_column_answered(const mstmm_state *state, int index, int ahead)
+MSTMM_AT_ONCE void mstmm_fetch_laws_column_forward(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
     if (!body) return;
@@ -6621,18 +6621,18 @@ MSTMM_AT_ONCE void mstmm_fetch_laws_column_answered(const mstmm_state *state, in
     mstmm_fetch(tangent + MSTMM_TANGENT_H(body->nu, body->nq), tangent + MSTMM_TANGENT_GAIN(body->nu, body->nq) + nu * nu);
     mstmm_fetch(tangent + MSTMM_TANGENT_Y(body->nu, body->nq), tangent + MSTMM_TANGENT_Y(body->nu, body->nq) + nu);
 }
-static int mstmm_pass_laws_column_answered(mstmm_state *state)
+static int mstmm_pass_laws_column_forward(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = 0; i < model->n_bodies; i++) {
-        if (mstmm_beyond_cache(model)) mstmm_fetch_laws_column_answered(state, i, MSTMM_TILE);
-        const int code = mstmm_at_laws_column_answered(state, i);
+        if (mstmm_beyond_cache(model)) mstmm_fetch_laws_column_forward(state, i, MSTMM_TILE);
+        const int code = mstmm_at_laws_column_forward(state, i);
         if (code) return code;
     }
     return 0;
 }
 
-MSTMM_AT_ONCE void mstmm_fetch_composed(const mstmm_state *state, int index, int ahead)
+MSTMM_AT_ONCE void mstmm_fetch_composite_inertia(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
     if (!body) return;
@@ -6642,12 +6642,12 @@ MSTMM_AT_ONCE void mstmm_fetch_composed(const mstmm_state *state, int index, int
     mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU), mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
     mstmm_fetch(body->hinge_p, body->body_p);
 }
-static int mstmm_pass_composed(mstmm_state *state)
+static int mstmm_pass_composite_inertia(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = model->n_bodies - 1; i >= 0; i--) {
-        if (mstmm_beyond_cache(model)) mstmm_fetch_composed(state, i, -MSTMM_TILE);
-        const int code = mstmm_at_composed(state, i);
+        if (mstmm_beyond_cache(model)) mstmm_fetch_composite_inertia(state, i, -MSTMM_TILE);
+        const int code = mstmm_at_composite_inertia(state, i);
         if (code) return code;
     }
     return 0;
@@ -6686,19 +6686,19 @@ static int mstmm_chain_accelerations_in_plane_forward_in_plane(mstmm_state *stat
     return 0;
 }
 
-static int mstmm_chain_accelerations_in_plane_answered_in_plane(mstmm_state *state)
+static int mstmm_chain_accelerations_in_plane_recover_with_rows_in_plane(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     int code, loop = 0;
     for (int first = 0; first < model->n_bodies; first += MSTMM_TILE) {
         const int end = mstmm_end_of_tile(model, first);
         for (int i = first; i < end; i++) {
-            code = mstmm_at_answered_in_plane(state, i);
+            code = mstmm_at_recover_with_rows_in_plane(state, i);
             if (code) return code;
         }
         for (; loop < model->n_closures && mstmm_last_of(model, loop) < end; loop++) {
             const int i = loop;
-            code = mstmm_at_closures_answered_in_plane(state, i);
+            code = mstmm_at_closure_accelerations_in_plane(state, i);
             if (code) return code;
         }
     }
@@ -6721,7 +6721,7 @@ static int mstmm_chain_inverse_dynamics_forward(mstmm_state *state)
     for (int first = 0; first < model->n_bodies; first += MSTMM_TILE) {
         const int end = mstmm_end_of_tile(model, first);
         for (int i = first; i < end; i++) {
-            code = mstmm_at_prescribed(state, i);
+            code = mstmm_at_prescribed_accelerations(state, i);
             if (code) return code;
         }
         for (int i = first; i < end; i++) {
@@ -6759,7 +6759,7 @@ static int mstmm_chain_correction_forward(mstmm_state *state)
     for (int first = 0; first < model->n_bodies; first += MSTMM_TILE) {
         const int end = mstmm_end_of_tile(model, first);
         for (int i = first; i < end; i++) {
-            code = mstmm_at_prescribed(state, i);
+            code = mstmm_at_prescribed_accelerations(state, i);
             if (code) return code;
         }
         for (int i = first; i < end; i++) {
@@ -6772,7 +6772,7 @@ static int mstmm_chain_correction_forward(mstmm_state *state)
             if (code) return code;
         }
         for (int i = first; i < end; i++) {
-            code = mstmm_at_unloaded(state, i);
+            code = mstmm_at_clear_loads(state, i);
             if (code) return code;
         }
     }
@@ -6795,7 +6795,7 @@ static int mstmm_chain_motion_forward(mstmm_state *state)
     for (int first = 0; first < model->n_bodies; first += MSTMM_TILE) {
         const int end = mstmm_end_of_tile(model, first);
         for (int i = first; i < end; i++) {
-            code = mstmm_at_prescribed(state, i);
+            code = mstmm_at_prescribed_accelerations(state, i);
             if (code) return code;
         }
         for (int i = first; i < end; i++) {
@@ -6827,7 +6827,7 @@ static int mstmm_chain_factorisation_forward(mstmm_state *state)
     for (int first = 0; first < model->n_bodies; first += MSTMM_TILE) {
         const int end = mstmm_end_of_tile(model, first);
         for (int i = first; i < end; i++) {
-            code = mstmm_at_prescribed(state, i);
+            code = mstmm_at_prescribed_accelerations(state, i);
             if (code) return code;
         }
         for (int i = first; i < end; i++) {
@@ -6839,7 +6839,7 @@ static int mstmm_chain_factorisation_forward(mstmm_state *state)
     return 0;
 }
 
-MSTMM_AT_ONCE void mstmm_fetch_column_carried_tile(const mstmm_state *state, int index, int ahead)
+MSTMM_AT_ONCE void mstmm_fetch_column_backward_tile(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
     if (!body) return;
@@ -6849,7 +6849,7 @@ MSTMM_AT_ONCE void mstmm_fetch_column_carried_tile(const mstmm_state *state, int
     mstmm_fetch(block + MSTMM_BLOCK_E, block + MSTMM_BLOCK_E + 6);
     mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU), mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE) + 6 * nu);
 }
-static int mstmm_tiles_column_carried(mstmm_state *state)
+static int mstmm_tiles_column_backward(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     int code, begun = model->n_bodies;
@@ -6862,8 +6862,8 @@ static int mstmm_tiles_column_carried(mstmm_state *state)
         }
         if (least < begun) begun = least;
         for (int i = end - 1; i >= first; i--) {
-            if (mstmm_beyond_cache(model)) mstmm_fetch_column_carried_tile(state, i, -MSTMM_TILE);
-            code = mstmm_at_column_carried(state, i);
+            if (mstmm_beyond_cache(model)) mstmm_fetch_column_backward_tile(state, i, -MSTMM_TILE);
+            code = mstmm_at_column_backward(state, i);
             if (code) return code;
         }
     }
@@ -6890,7 +6890,7 @@ static int mstmm_chain_required_slope_forward_slope(mstmm_state *state)
     for (int first = 0; first < model->n_bodies; first += MSTMM_TILE) {
         const int end = mstmm_end_of_tile(model, first);
         for (int i = first; i < end; i++) {
-            code = mstmm_at_prescribed_slope(state, i);
+            code = mstmm_at_prescribed_accelerations_slope(state, i);
             if (code) return code;
         }
         for (int i = first; i < end; i++) {
@@ -6902,7 +6902,7 @@ static int mstmm_chain_required_slope_forward_slope(mstmm_state *state)
     return 0;
 }
 
-MSTMM_AT_ONCE void mstmm_fetch_required_slope_tile(const mstmm_state *state, int index, int ahead)
+MSTMM_AT_ONCE void mstmm_fetch_required_efforts_slope_tile(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
     if (!body) return;
@@ -6916,7 +6916,7 @@ MSTMM_AT_ONCE void mstmm_fetch_required_slope_tile(const mstmm_state *state, int
     mstmm_fetch(d_block + MSTMM_BLOCK_E, d_block + MSTMM_BLOCK_E + 6);
     mstmm_fetch(mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU), mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H) + 6 * nu);
 }
-static int mstmm_tiles_required_slope(mstmm_state *state)
+static int mstmm_tiles_required_efforts_slope(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     int code, begun = model->n_bodies, law = model->n_laws;
@@ -6936,7 +6936,7 @@ static int mstmm_tiles_required_slope(mstmm_state *state)
         }
         if (model->n_couplings) {
             for (int i = begun - 1; i >= least; i--) {
-                code = mstmm_at_couplings_loaded_slope(state, i);
+                code = mstmm_at_coupling_loads_slope(state, i);
                 if (code) return code;
             }
         }
@@ -6948,8 +6948,8 @@ static int mstmm_tiles_required_slope(mstmm_state *state)
         }
         if (least < begun) begun = least;
         for (int i = end - 1; i >= first; i--) {
-            if (mstmm_beyond_cache(model)) mstmm_fetch_required_slope_tile(state, i, -MSTMM_TILE);
-            code = mstmm_at_required_slope(state, i);
+            if (mstmm_beyond_cache(model)) mstmm_fetch_required_efforts_slope_tile(state, i, -MSTMM_TILE);
+            code = mstmm_at_required_efforts_slope(state, i);
             if (code) return code;
         }
     }
@@ -6976,7 +6976,7 @@ static int mstmm_chain_applied_slope_forward_slope(mstmm_state *state)
     for (int first = 0; first < model->n_bodies; first += MSTMM_TILE) {
         const int end = mstmm_end_of_tile(model, first);
         for (int i = first; i < end; i++) {
-            code = mstmm_at_prescribed_slope(state, i);
+            code = mstmm_at_prescribed_accelerations_slope(state, i);
             if (code) return code;
         }
         for (int i = first; i < end; i++) {
@@ -7031,7 +7031,7 @@ static int mstmm_tiles_tangent_condense(mstmm_state *state)
     return 0;
 }
 
-MSTMM_AT_ONCE void mstmm_fetch_tangent_brought_tangent_own_chain(const mstmm_state *state, int index, int ahead)
+MSTMM_AT_ONCE void mstmm_fetch_tangent_contributions_tangent_own_chain(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
     if (!body) return;
@@ -7045,14 +7045,14 @@ MSTMM_AT_ONCE void mstmm_fetch_tangent_brought_tangent_own_chain(const mstmm_sta
     mstmm_fetch(tangent + MSTMM_TANGENT_ALONG(body->nu, body->nq), tangent + MSTMM_TANGENT_ALONG(body->nu, body->nq) + nq * nu);
     mstmm_fetch(body->rotor, body->body_p + MSTMM_RIGID_NUMBERS);
 }
-static int mstmm_chain_tangent_brought_tangent_own(mstmm_state *state)
+static int mstmm_chain_tangent_contributions_tangent_own(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     int code, law = 0;
     for (int first = 0; first < model->n_bodies; first += MSTMM_TILE) {
         const int end = mstmm_end_of_tile(model, first);
         for (int i = first; i < end; i++) {
-            if (mstmm_beyond_cache(model)) mstmm_fetch_tangent_brought_tangent_own_chain(state, i, MSTMM_TILE);
+            if (mstmm_beyond_cache(model)) mstmm_fetch_tangent_contributions_tangent_own_chain(state, i, MSTMM_TILE);
             code = mstmm_at_tangent_own(state, i);
             if (code) return code;
         }
@@ -7063,14 +7063,14 @@ static int mstmm_chain_tangent_brought_tangent_own(mstmm_state *state)
             if (code) return code;
         }
         for (int i = first; i < end; i++) {
-            code = mstmm_at_tangent_brought(state, i);
+            code = mstmm_at_tangent_contributions(state, i);
             if (code) return code;
         }
     }
     return 0;
 }
 
-MSTMM_AT_ONCE void mstmm_fetch_tangent_carried_tile(const mstmm_state *state, int index, int ahead)
+MSTMM_AT_ONCE void mstmm_fetch_tangent_backward_tile(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
     if (!body) return;
@@ -7084,7 +7084,7 @@ MSTMM_AT_ONCE void mstmm_fetch_tangent_carried_tile(const mstmm_state *state, in
     mstmm_fetch(tangent + MSTMM_TANGENT_H(body->nu, body->nq), tangent + MSTMM_TANGENT_V(body->nu, body->nq) + 6 * nu);
     mstmm_fetch(tangent + MSTMM_TANGENT_INVERSE(body->nu, body->nq), tangent + MSTMM_TANGENT_Y(body->nu, body->nq) + nu);
 }
-static int mstmm_tiles_tangent_carried(mstmm_state *state)
+static int mstmm_tiles_tangent_backward(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     int code, begun = model->n_bodies;
@@ -7097,15 +7097,15 @@ static int mstmm_tiles_tangent_carried(mstmm_state *state)
         }
         if (least < begun) begun = least;
         for (int i = end - 1; i >= first; i--) {
-            if (mstmm_beyond_cache(model)) mstmm_fetch_tangent_carried_tile(state, i, -MSTMM_TILE);
-            code = mstmm_at_tangent_carried(state, i);
+            if (mstmm_beyond_cache(model)) mstmm_fetch_tangent_backward_tile(state, i, -MSTMM_TILE);
+            code = mstmm_at_tangent_backward(state, i);
             if (code) return code;
         }
     }
     return 0;
 }
 
-MSTMM_AT_ONCE void mstmm_fetch_known_carried_tile(const mstmm_state *state, int index, int ahead)
+MSTMM_AT_ONCE void mstmm_fetch_increment_backward_tile(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
     if (!body) return;
@@ -7122,7 +7122,7 @@ MSTMM_AT_ONCE void mstmm_fetch_known_carried_tile(const mstmm_state *state, int 
     mstmm_fetch(tangent + MSTMM_TANGENT_INVERSE(body->nu, body->nq), tangent + MSTMM_TANGENT_KNOWN(body->nu, body->nq) + 9);
     mstmm_fetch(body->rotor, body->body_p);
 }
-static int mstmm_tiles_known_carried(mstmm_state *state)
+static int mstmm_tiles_increment_backward(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     int code, begun = model->n_bodies, law = model->n_laws;
@@ -7132,18 +7132,18 @@ static int mstmm_tiles_known_carried(mstmm_state *state)
         const int behind = law;
         while (law > 0 && model->laws[law - 1].body >= least) law--;
         for (int i = begun - 1; i >= least; i--) {
-            code = mstmm_at_known_column(state, i);
+            code = mstmm_at_increment_column(state, i);
             if (code) return code;
         }
         for (int i = law; i < behind; i++) {
             if (mstmm_beyond_cache(model)) mstmm_fetch_law(model, i, -MSTMM_TILE);
-            code = mstmm_at_known_laws(state, i);
+            code = mstmm_at_increment_laws(state, i);
             if (code) return code;
         }
         if (least < begun) begun = least;
         for (int i = end - 1; i >= first; i--) {
-            if (mstmm_beyond_cache(model)) mstmm_fetch_known_carried_tile(state, i, -MSTMM_TILE);
-            code = mstmm_at_known_carried(state, i);
+            if (mstmm_beyond_cache(model)) mstmm_fetch_increment_backward_tile(state, i, -MSTMM_TILE);
+            code = mstmm_at_increment_backward(state, i);
             if (code) return code;
         }
     }
@@ -7200,7 +7200,7 @@ static int mstmm_tiles_laws_factorise(mstmm_state *state)
     return 0;
 }
 
-MSTMM_AT_ONCE void mstmm_fetch_laws_column_carried_tile(const mstmm_state *state, int index, int ahead)
+MSTMM_AT_ONCE void mstmm_fetch_laws_column_backward_tile(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
     if (!body) return;
@@ -7214,7 +7214,7 @@ MSTMM_AT_ONCE void mstmm_fetch_laws_column_carried_tile(const mstmm_state *state
     mstmm_fetch(tangent + MSTMM_TANGENT_H(body->nu, body->nq), tangent + MSTMM_TANGENT_V(body->nu, body->nq) + 6 * nu);
     mstmm_fetch(tangent + MSTMM_TANGENT_Y(body->nu, body->nq), tangent + MSTMM_TANGENT_Y(body->nu, body->nq) + nu);
 }
-static int mstmm_tiles_laws_column_carried(mstmm_state *state)
+static int mstmm_tiles_laws_column_backward(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     int code, begun = model->n_bodies, law = model->n_laws;
@@ -7230,7 +7230,7 @@ static int mstmm_tiles_laws_column_carried(mstmm_state *state)
         if (state->tangents->shifted && model->n_laws) {
             for (int i = law; i < behind; i++) {
                 if (mstmm_beyond_cache(model)) mstmm_fetch_law(model, i, -MSTMM_TILE);
-                code = mstmm_at_known_laws(state, i);
+                code = mstmm_at_increment_laws(state, i);
                 if (code) return code;
             }
         }
@@ -7242,8 +7242,8 @@ static int mstmm_tiles_laws_column_carried(mstmm_state *state)
         }
         if (least < begun) begun = least;
         for (int i = end - 1; i >= first; i--) {
-            if (mstmm_beyond_cache(model)) mstmm_fetch_laws_column_carried_tile(state, i, -MSTMM_TILE);
-            code = mstmm_at_laws_column_carried(state, i);
+            if (mstmm_beyond_cache(model)) mstmm_fetch_laws_column_backward_tile(state, i, -MSTMM_TILE);
+            code = mstmm_at_laws_column_backward(state, i);
             if (code) return code;
         }
     }
@@ -7266,7 +7266,7 @@ static int mstmm_chain_composition_forward(mstmm_state *state)
     for (int first = 0; first < model->n_bodies; first += MSTMM_TILE) {
         const int end = mstmm_end_of_tile(model, first);
         for (int i = first; i < end; i++) {
-            code = mstmm_at_prescribed(state, i);
+            code = mstmm_at_prescribed_accelerations(state, i);
             if (code) return code;
         }
         for (int i = first; i < end; i++) {
@@ -7278,12 +7278,12 @@ static int mstmm_chain_composition_forward(mstmm_state *state)
     return 0;
 }
 
-/* Driven coordinates, and the values of the scene's expressions. */
-int mstmm_run_given(mstmm_state *state)
+/* Driven coordinates and values of expressions. */
+int mstmm_run_prescribed_values(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     int code;
-    code = mstmm_pass_prescribed(state);
+    code = mstmm_pass_prescribed_accelerations(state);
     if (code) return code;
     if (model->n_drives) {
         code = mstmm_hook_drive_values(state);
@@ -7305,7 +7305,7 @@ int mstmm_run_accelerations(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     int code;
-    code = mstmm_pass_prescribed(state);
+    code = mstmm_pass_prescribed_accelerations(state);
     if (code) return code;
     if (model->n_drives) {
         code = mstmm_hook_drive_values(state);
@@ -7340,11 +7340,11 @@ int mstmm_run_accelerations(mstmm_state *state)
     code = mstmm_pass_laws(state);
     if (code) return code;
     if (state->refined && model->looped) {
-        code = mstmm_pass_restated(state);
+        code = mstmm_pass_rotor_residual(state);
         if (code) return code;
     }
     if (state->refined && !model->looped) {
-        code = mstmm_pass_restated_of_tree(state);
+        code = mstmm_pass_rotor_residual_of_tree(state);
         if (code) return code;
     }
     if (state->balance && model->n_flexible) {
@@ -7396,7 +7396,7 @@ int mstmm_run_accelerations(mstmm_state *state)
         if (code) return code;
     }
     if (model->looped) {
-        code = mstmm_hook_rows_begun(state);
+        code = mstmm_hook_begin_rows(state);
         if (code) return code;
     }
     if (model->looped) {
@@ -7404,27 +7404,27 @@ int mstmm_run_accelerations(mstmm_state *state)
         if (code) return code;
     }
     if (model->looped) {
-        code = mstmm_hook_rows_asked(state);
+        code = mstmm_hook_set_row_targets(state);
         if (code) return code;
     }
     if (model->looped) {
-        code = mstmm_pass_carried(state);
+        code = mstmm_pass_condense_with_rows(state);
         if (code) return code;
     }
     if (model->looped) {
-        code = mstmm_pass_row_closed(state);
+        code = mstmm_pass_row_elimination(state);
         if (code) return code;
     }
     if (model->looped) {
-        code = mstmm_pass_row_found(state);
+        code = mstmm_pass_row_multiplier(state);
         if (code) return code;
     }
     if (model->looped) {
-        code = mstmm_pass_answered(state);
+        code = mstmm_pass_recover_with_rows(state);
         if (code) return code;
     }
     if (model->looped) {
-        code = mstmm_pass_closures_answered(state);
+        code = mstmm_pass_closure_accelerations(state);
         if (code) return code;
     }
     if (state->balance) {
@@ -7432,11 +7432,11 @@ int mstmm_run_accelerations(mstmm_state *state)
         if (code) return code;
     }
     if (model->n_couplings) {
-        code = mstmm_pass_couplings_answered(state);
+        code = mstmm_pass_coupling_multipliers(state);
         if (code) return code;
     }
     if (model->product) {
-        code = mstmm_hook_product_compared(state);
+        code = mstmm_hook_compare_product(state);
         if (code) return code;
     }
     return 0;
@@ -7447,7 +7447,7 @@ int mstmm_run_accelerations_in_plane(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     int code;
-    code = mstmm_hook_rows_begun(state);
+    code = mstmm_hook_begin_rows(state);
     if (code) return code;
     if (model->n_values) {
         code = mstmm_hook_expression_values(state);
@@ -7459,13 +7459,13 @@ int mstmm_run_accelerations_in_plane(mstmm_state *state)
     if (code) return code;
     code = mstmm_pass_forces_in_plane(state);
     if (code) return code;
-    code = mstmm_pass_carried_in_plane(state);
+    code = mstmm_pass_condense_with_rows_in_plane(state);
     if (code) return code;
-    code = mstmm_pass_row_closed_in_plane(state);
+    code = mstmm_pass_row_elimination_in_plane(state);
     if (code) return code;
-    code = mstmm_pass_row_found_in_plane(state);
+    code = mstmm_pass_row_multiplier_in_plane(state);
     if (code) return code;
-    code = mstmm_chain_accelerations_in_plane_answered_in_plane(state);
+    code = mstmm_chain_accelerations_in_plane_recover_with_rows_in_plane(state);
     if (code) return code;
     return 0;
 }
@@ -7476,7 +7476,7 @@ int mstmm_run_inverse_dynamics(mstmm_state *state)
     const mstmm_model *model = state->model;
     int code;
     if (model->n_drives || model->n_values) {
-        code = mstmm_pass_prescribed(state);
+        code = mstmm_pass_prescribed_accelerations(state);
         if (code) return code;
         if (model->n_drives) {
             code = mstmm_hook_drive_values(state);
@@ -7521,18 +7521,18 @@ int mstmm_run_inverse_dynamics(mstmm_state *state)
         if (code) return code;
     }
     if (model->n_couplings && state->residual) {
-        code = mstmm_hook_couplings_valued(state);
+        code = mstmm_hook_evaluate_couplings(state);
         if (code) return code;
     }
     if (model->n_couplings && state->residual) {
-        code = mstmm_pass_couplings_loaded(state);
+        code = mstmm_pass_coupling_loads(state);
         if (code) return code;
     }
     if (model->looped && state->residual) {
-        code = mstmm_pass_closures_loaded(state);
+        code = mstmm_pass_closure_loads(state);
         if (code) return code;
     }
-    code = mstmm_pass_required(state);
+    code = mstmm_pass_required_efforts(state);
     if (code) return code;
     return 0;
 }
@@ -7543,7 +7543,7 @@ int mstmm_run_correction(mstmm_state *state)
     const mstmm_model *model = state->model;
     int code;
     if (model->n_drives) {
-        code = mstmm_pass_prescribed(state);
+        code = mstmm_pass_prescribed_accelerations(state);
         if (code) return code;
         if (model->n_drives) {
             code = mstmm_hook_drive_values(state);
@@ -7557,13 +7557,13 @@ int mstmm_run_correction(mstmm_state *state)
         if (code) return code;
         code = mstmm_pass_poses(state);
         if (code) return code;
-        code = mstmm_pass_unloaded(state);
+        code = mstmm_pass_clear_loads(state);
         if (code) return code;
     } else {
         code = mstmm_chain_correction_forward(state);
         if (code) return code;
     }
-    code = mstmm_hook_struck(state);
+    code = mstmm_hook_apply_impact(state);
     if (code) return code;
     if (!model->looped) {
         code = mstmm_pass_condense(state);
@@ -7574,7 +7574,7 @@ int mstmm_run_correction(mstmm_state *state)
         if (code) return code;
     }
     if (model->looped) {
-        code = mstmm_hook_rows_begun(state);
+        code = mstmm_hook_begin_rows(state);
         if (code) return code;
     }
     if (model->looped) {
@@ -7582,27 +7582,27 @@ int mstmm_run_correction(mstmm_state *state)
         if (code) return code;
     }
     if (model->looped) {
-        code = mstmm_hook_rows_asked(state);
+        code = mstmm_hook_set_row_targets(state);
         if (code) return code;
     }
     if (model->looped) {
-        code = mstmm_pass_carried(state);
+        code = mstmm_pass_condense_with_rows(state);
         if (code) return code;
     }
     if (model->looped) {
-        code = mstmm_pass_row_closed(state);
+        code = mstmm_pass_row_elimination(state);
         if (code) return code;
     }
     if (model->looped) {
-        code = mstmm_pass_row_found(state);
+        code = mstmm_pass_row_multiplier(state);
         if (code) return code;
     }
     if (model->looped) {
-        code = mstmm_pass_answered(state);
+        code = mstmm_pass_recover_with_rows(state);
         if (code) return code;
     }
     if (model->looped) {
-        code = mstmm_pass_closures_answered(state);
+        code = mstmm_pass_closure_accelerations(state);
         if (code) return code;
     }
     return 0;
@@ -7614,7 +7614,7 @@ int mstmm_run_motion(mstmm_state *state)
     const mstmm_model *model = state->model;
     int code;
     if (model->n_drives || model->n_values) {
-        code = mstmm_pass_prescribed(state);
+        code = mstmm_pass_prescribed_accelerations(state);
         if (code) return code;
         if (model->n_drives) {
             code = mstmm_hook_drive_values(state);
@@ -7640,7 +7640,7 @@ int mstmm_run_motion(mstmm_state *state)
 }
 
 /* Poses only, after a sweep. */
-int mstmm_run_posed(mstmm_state *state)
+int mstmm_run_poses_only(mstmm_state *state)
 {
     int code;
     code = mstmm_pass_poses(state);
@@ -7663,9 +7663,9 @@ int mstmm_run_factorisation(mstmm_state *state)
 int mstmm_run_solution(mstmm_state *state)
 {
     int code;
-    code = mstmm_tiles_column_carried(state);
+    code = mstmm_tiles_column_backward(state);
     if (code) return code;
-    code = mstmm_pass_column_answered(state);
+    code = mstmm_pass_column_forward(state);
     if (code) return code;
     return 0;
 }
@@ -7676,7 +7676,7 @@ int mstmm_run_required_slope(mstmm_state *state)
     const mstmm_model *model = state->model;
     int code;
     if (model->n_drives || model->n_values) {
-        code = mstmm_pass_prescribed_slope(state);
+        code = mstmm_pass_prescribed_accelerations_slope(state);
         if (code) return code;
         if (model->n_drives) {
             code = mstmm_hook_drive_slopes(state);
@@ -7706,7 +7706,7 @@ int mstmm_run_required_slope(mstmm_state *state)
             if (code) return code;
         }
         if (model->n_couplings) {
-            code = mstmm_pass_couplings_loaded_slope(state);
+            code = mstmm_pass_coupling_loads_slope(state);
             if (code) return code;
         }
         if ((model->needs_pose || model->product)) {
@@ -7726,13 +7726,13 @@ int mstmm_run_required_slope(mstmm_state *state)
             if (code) return code;
         }
         if (model->looped) {
-            code = mstmm_pass_closures_loaded_slope(state);
+            code = mstmm_pass_closure_loads_slope(state);
             if (code) return code;
         }
-        code = mstmm_pass_required_slope(state);
+        code = mstmm_pass_required_efforts_slope(state);
         if (code) return code;
     } else {
-        code = mstmm_tiles_required_slope(state);
+        code = mstmm_tiles_required_efforts_slope(state);
         if (code) return code;
     }
     return 0;
@@ -7744,7 +7744,7 @@ int mstmm_run_applied_slope(mstmm_state *state)
     const mstmm_model *model = state->model;
     int code;
     if (model->n_drives || model->n_values) {
-        code = mstmm_pass_prescribed_slope(state);
+        code = mstmm_pass_prescribed_accelerations_slope(state);
         if (code) return code;
         if (model->n_drives) {
             code = mstmm_hook_drive_slopes(state);
@@ -7789,7 +7789,7 @@ int mstmm_run_applied_slope(mstmm_state *state)
         if (code) return code;
     }
     if (model->n_couplings) {
-        code = mstmm_pass_couplings_loaded_slope(state);
+        code = mstmm_pass_coupling_loads_slope(state);
         if (code) return code;
     }
     if (model->looped) {
@@ -7797,7 +7797,7 @@ int mstmm_run_applied_slope(mstmm_state *state)
         if (code) return code;
     }
     if (model->looped) {
-        code = mstmm_pass_closures_loaded_slope(state);
+        code = mstmm_pass_closure_loads_slope(state);
         if (code) return code;
     }
     return 0;
@@ -7831,7 +7831,7 @@ int mstmm_run_tangent(mstmm_state *state)
 }
 
 /* Contributions to the tangent before elimination, after inverse dynamics. */
-int mstmm_run_tangent_brought(mstmm_state *state)
+int mstmm_run_tangent_contributions(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     int code;
@@ -7848,10 +7848,10 @@ int mstmm_run_tangent_brought(mstmm_state *state)
             code = mstmm_pass_forces_by_place(state);
             if (code) return code;
         }
-        code = mstmm_pass_tangent_brought(state);
+        code = mstmm_pass_tangent_contributions(state);
         if (code) return code;
     } else {
-        code = mstmm_chain_tangent_brought_tangent_own(state);
+        code = mstmm_chain_tangent_contributions_tangent_own(state);
         if (code) return code;
     }
     return 0;
@@ -7868,30 +7868,30 @@ int mstmm_run_tangent_solution(mstmm_state *state)
             code = mstmm_hook_unit_load(state);
             if (code) return code;
         }
-        code = mstmm_pass_tangent_carried(state);
+        code = mstmm_pass_tangent_backward(state);
         if (code) return code;
     } else {
-        code = mstmm_tiles_tangent_carried(state);
+        code = mstmm_tiles_tangent_backward(state);
         if (code) return code;
     }
-    code = mstmm_pass_tangent_answered(state);
+    code = mstmm_pass_tangent_forward(state);
     if (code) return code;
     return 0;
 }
 
 /* One right-hand side solved with the factored tangent and known increments. */
-int mstmm_run_tangent_beyond(mstmm_state *state)
+int mstmm_run_tangent_with_increments(mstmm_state *state)
 {
     int code;
-    code = mstmm_tiles_known_carried(state);
+    code = mstmm_tiles_increment_backward(state);
     if (code) return code;
-    code = mstmm_pass_known_answered(state);
+    code = mstmm_pass_increment_forward(state);
     if (code) return code;
     return 0;
 }
 
 /* Mass matrix and derivatives of laws factored, after inverse dynamics. */
-int mstmm_run_laws_alone(mstmm_state *state)
+int mstmm_run_approximate_tangent(mstmm_state *state)
 {
     int code;
     code = mstmm_tiles_laws_factorise(state);
@@ -7900,12 +7900,12 @@ int mstmm_run_laws_alone(mstmm_state *state)
 }
 
 /* One right-hand side solved with the mass matrix and laws. */
-int mstmm_run_laws_solution(mstmm_state *state)
+int mstmm_run_approximate_solution(mstmm_state *state)
 {
     int code;
-    code = mstmm_tiles_laws_column_carried(state);
+    code = mstmm_tiles_laws_column_backward(state);
     if (code) return code;
-    code = mstmm_pass_laws_column_answered(state);
+    code = mstmm_pass_laws_column_forward(state);
     if (code) return code;
     return 0;
 }
@@ -7916,7 +7916,7 @@ int mstmm_run_composition(mstmm_state *state)
     int code;
     code = mstmm_chain_composition_forward(state);
     if (code) return code;
-    code = mstmm_pass_composed(state);
+    code = mstmm_pass_composite_inertia(state);
     if (code) return code;
     return 0;
 }

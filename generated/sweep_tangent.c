@@ -14,22 +14,22 @@ int mstmm_sweep_tangent_node(int n, const real *restrict H, const real *restrict
     const real *restrict G, const real *restrict W, const real *restrict S, const real *restrict K,
     const real *restrict Z_z, const real *restrict Z_x, real *restrict V, real *restrict D,
     real *restrict right, real *restrict gain, real *restrict S_c, real *restrict work);
-int mstmm_sweep_tangent_absorb(int n, const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_tangent_assemble_port(int n, const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict B, const real *restrict G, const real *restrict W,
     const real *restrict S, const real *restrict T, real *restrict K_x, real *restrict K,
     real *restrict Z_z, real *restrict Z_x);
-int mstmm_sweep_tangent_push(int n, const real *restrict H, const real *restrict V,
+int mstmm_sweep_tangent_column_load(int n, const real *restrict H, const real *restrict V,
     const real *restrict D, const real *restrict e, const real *restrict e_f, real *restrict rest,
     real *restrict y, real *restrict e_c, real *restrict work);
-int mstmm_sweep_tangent_answer(int n, const real *restrict B, const real *restrict gain,
+int mstmm_sweep_tangent_column_solution(int n, const real *restrict B, const real *restrict gain,
     const real *restrict y, const real *restrict z_c, real *restrict x, real *restrict z);
-int mstmm_sweep_tangent_displaced(int n, const real *restrict B, const real *restrict x,
+int mstmm_sweep_tangent_port_motion(int n, const real *restrict B, const real *restrict x,
     const real *restrict z_c, real *restrict z);
-int mstmm_sweep_tangent_lag(int n, const real *restrict sq, const real *restrict kappa,
+int mstmm_sweep_tangent_increment_matrix(int n, const real *restrict sq, const real *restrict kappa,
     const real *restrict one, const real *restrict g_q, real *restrict A, real *restrict Q,
     real *restrict work);
-int mstmm_sweep_tangent_lagged(int n, const real *restrict Q, const real *restrict rate,
-    real *restrict dq);
+int mstmm_sweep_tangent_coordinate_increment(int n, const real *restrict Q,
+    const real *restrict rate, real *restrict dq);
 int mstmm_sweep_tangent_placed_rows(int n, const real *restrict H, const real *restrict S_p,
     real *restrict Z_p);
 int mstmm_sweep_tangent_placed_own(int n, const real *restrict B_p, const real *restrict S_p,
@@ -39,10 +39,10 @@ int mstmm_sweep_tangent_placed_reduce(int n, const real *restrict inverse, const
 int mstmm_sweep_tangent_placed_node(int n, const real *restrict H, const real *restrict V,
     const real *restrict D, const real *restrict S_p, const real *restrict Z_p,
     real *restrict right, real *restrict gain, real *restrict S_c, real *restrict work);
-int mstmm_sweep_tangent_placed_absorb(int n, const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_tangent_placed_port(int n, const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict B_p, const real *restrict S_p,
     const real *restrict T_p, real *restrict K, real *restrict Z_p, real *restrict Z_x);
-int mstmm_sweep_tangent_placed_left(int n, const real *restrict gain, const real *restrict p,
+int mstmm_sweep_tangent_placed_remainder(int n, const real *restrict gain, const real *restrict p,
     real *restrict y);
 
 #ifndef MSTMM_SOLVE_LU
@@ -1035,7 +1035,7 @@ static const mstmm_guard mstmm_sweep_tangent_node_guards[] = {
  * out Z_x[n][n], added to what is there
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_tangent_absorb_sized(int n, const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_tangent_assemble_port_sized(int n, const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict B, const real *restrict G, const real *restrict W,
     const real *restrict S, const real *restrict T, real *restrict K_x, real *restrict K,
     real *restrict Z_z, real *restrict Z_x)
@@ -1426,26 +1426,26 @@ int mstmm_sweep_tangent_absorb_sized(int n, const real *restrict Rc, const real 
     return 0;
 }
 
-int mstmm_sweep_tangent_absorb(int n, const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_tangent_assemble_port(int n, const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict B, const real *restrict G, const real *restrict W,
     const real *restrict S, const real *restrict T, real *restrict K_x, real *restrict K,
     real *restrict Z_z, real *restrict Z_x)
 {
     switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_tangent_absorb_sized(1, Rc, r, H, B, G, W, S, T, K_x, K, Z_z, Z_x);
-    case 2: return mstmm_sweep_tangent_absorb_sized(2, Rc, r, H, B, G, W, S, T, K_x, K, Z_z, Z_x);
-    case 3: return mstmm_sweep_tangent_absorb_sized(3, Rc, r, H, B, G, W, S, T, K_x, K, Z_z, Z_x);
-    case 4: return mstmm_sweep_tangent_absorb_sized(4, Rc, r, H, B, G, W, S, T, K_x, K, Z_z, Z_x);
-    default: return mstmm_sweep_tangent_absorb_sized(n, Rc, r, H, B, G, W, S, T, K_x, K, Z_z, Z_x);
+    case 1: return mstmm_sweep_tangent_assemble_port_sized(1, Rc, r, H, B, G, W, S, T, K_x, K, Z_z, Z_x);
+    case 2: return mstmm_sweep_tangent_assemble_port_sized(2, Rc, r, H, B, G, W, S, T, K_x, K, Z_z, Z_x);
+    case 3: return mstmm_sweep_tangent_assemble_port_sized(3, Rc, r, H, B, G, W, S, T, K_x, K, Z_z, Z_x);
+    case 4: return mstmm_sweep_tangent_assemble_port_sized(4, Rc, r, H, B, G, W, S, T, K_x, K, Z_z, Z_x);
+    default: return mstmm_sweep_tangent_assemble_port_sized(n, Rc, r, H, B, G, W, S, T, K_x, K, Z_z, Z_x);
     }
 }
 
-static int mstmm_sweep_tangent_absorb_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_tangent_assemble_port_call(int n, const real *const *in, real *const *out)
 {
-    return mstmm_sweep_tangent_absorb(n, in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1], out[2], out[3]);
+    return mstmm_sweep_tangent_assemble_port(n, in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1], out[2], out[3]);
 }
 
-static const mstmm_port mstmm_sweep_tangent_absorb_inputs[] = {
+static const mstmm_port mstmm_sweep_tangent_assemble_port_inputs[] = {
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"H", 6, "", 0, 1},
@@ -1456,7 +1456,7 @@ static const mstmm_port mstmm_sweep_tangent_absorb_inputs[] = {
     {"T", 54, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_tangent_absorb_outputs[] = {
+static const mstmm_port mstmm_sweep_tangent_assemble_port_outputs[] = {
     {"K_x", 6, "", 0, 1},
     {"K", 6, "", 1, 1},
     {"Z_z", 9, "", 1, 1},
@@ -1477,7 +1477,7 @@ static const mstmm_port mstmm_sweep_tangent_absorb_outputs[] = {
  * out work[n][n] factor L, D of solve
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_tangent_push_sized(int n, const real *restrict H, const real *restrict V,
+int mstmm_sweep_tangent_column_load_sized(int n, const real *restrict H, const real *restrict V,
     const real *restrict D, const real *restrict e, const real *restrict e_f, real *restrict rest,
     real *restrict y, real *restrict e_c, real *restrict work)
 {
@@ -1546,25 +1546,25 @@ int mstmm_sweep_tangent_push_sized(int n, const real *restrict H, const real *re
     return 0;
 }
 
-int mstmm_sweep_tangent_push(int n, const real *restrict H, const real *restrict V,
+int mstmm_sweep_tangent_column_load(int n, const real *restrict H, const real *restrict V,
     const real *restrict D, const real *restrict e, const real *restrict e_f, real *restrict rest,
     real *restrict y, real *restrict e_c, real *restrict work)
 {
     switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_tangent_push_sized(1, H, V, D, e, e_f, rest, y, e_c, work);
-    case 2: return mstmm_sweep_tangent_push_sized(2, H, V, D, e, e_f, rest, y, e_c, work);
-    case 3: return mstmm_sweep_tangent_push_sized(3, H, V, D, e, e_f, rest, y, e_c, work);
-    case 4: return mstmm_sweep_tangent_push_sized(4, H, V, D, e, e_f, rest, y, e_c, work);
-    default: return mstmm_sweep_tangent_push_sized(n, H, V, D, e, e_f, rest, y, e_c, work);
+    case 1: return mstmm_sweep_tangent_column_load_sized(1, H, V, D, e, e_f, rest, y, e_c, work);
+    case 2: return mstmm_sweep_tangent_column_load_sized(2, H, V, D, e, e_f, rest, y, e_c, work);
+    case 3: return mstmm_sweep_tangent_column_load_sized(3, H, V, D, e, e_f, rest, y, e_c, work);
+    case 4: return mstmm_sweep_tangent_column_load_sized(4, H, V, D, e, e_f, rest, y, e_c, work);
+    default: return mstmm_sweep_tangent_column_load_sized(n, H, V, D, e, e_f, rest, y, e_c, work);
     }
 }
 
-static int mstmm_sweep_tangent_push_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_tangent_column_load_call(int n, const real *const *in, real *const *out)
 {
-    return mstmm_sweep_tangent_push(n, in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3]);
+    return mstmm_sweep_tangent_column_load(n, in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3]);
 }
 
-static const mstmm_port mstmm_sweep_tangent_push_inputs[] = {
+static const mstmm_port mstmm_sweep_tangent_column_load_inputs[] = {
     {"H", 6, "", 0, 1},
     {"V", 6, "", 0, 1},
     {"D", 1, "", 0, 2},
@@ -1572,14 +1572,14 @@ static const mstmm_port mstmm_sweep_tangent_push_inputs[] = {
     {"e_f", 1, "", 0, 1},
 };
 
-static const mstmm_port mstmm_sweep_tangent_push_outputs[] = {
+static const mstmm_port mstmm_sweep_tangent_column_load_outputs[] = {
     {"rest", 1, "", 0, 1},
     {"y", 1, "", 0, 1},
     {"e_c", 6, "N, N*m", 0, 0},
     {"work", 1, "", 0, 2},
 };
 
-static const mstmm_guard mstmm_sweep_tangent_push_guards[] = {
+static const mstmm_guard mstmm_sweep_tangent_column_load_guards[] = {
     {1, "a pivot of D vanishes: a motion is undetermined"},
     {2, "the determinant is negative; all results are there"},
 };
@@ -1595,8 +1595,9 @@ static const mstmm_guard mstmm_sweep_tangent_push_guards[] = {
  * out z[9] change of the body's motion, own axes
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_tangent_answer_sized(int n, const real *restrict B, const real *restrict gain,
-    const real *restrict y, const real *restrict z_c, real *restrict x, real *restrict z)
+int mstmm_sweep_tangent_column_solution_sized(int n, const real *restrict B,
+    const real *restrict gain, const real *restrict y, const real *restrict z_c, real *restrict x,
+    real *restrict z)
 {
     for (int k = 0; k < n; ++k) {
         const real t0 = z_c[0] * gain[9 * k];
@@ -1685,31 +1686,31 @@ int mstmm_sweep_tangent_answer_sized(int n, const real *restrict B, const real *
     return 0;
 }
 
-int mstmm_sweep_tangent_answer(int n, const real *restrict B, const real *restrict gain,
+int mstmm_sweep_tangent_column_solution(int n, const real *restrict B, const real *restrict gain,
     const real *restrict y, const real *restrict z_c, real *restrict x, real *restrict z)
 {
     switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_tangent_answer_sized(1, B, gain, y, z_c, x, z);
-    case 2: return mstmm_sweep_tangent_answer_sized(2, B, gain, y, z_c, x, z);
-    case 3: return mstmm_sweep_tangent_answer_sized(3, B, gain, y, z_c, x, z);
-    case 4: return mstmm_sweep_tangent_answer_sized(4, B, gain, y, z_c, x, z);
-    default: return mstmm_sweep_tangent_answer_sized(n, B, gain, y, z_c, x, z);
+    case 1: return mstmm_sweep_tangent_column_solution_sized(1, B, gain, y, z_c, x, z);
+    case 2: return mstmm_sweep_tangent_column_solution_sized(2, B, gain, y, z_c, x, z);
+    case 3: return mstmm_sweep_tangent_column_solution_sized(3, B, gain, y, z_c, x, z);
+    case 4: return mstmm_sweep_tangent_column_solution_sized(4, B, gain, y, z_c, x, z);
+    default: return mstmm_sweep_tangent_column_solution_sized(n, B, gain, y, z_c, x, z);
     }
 }
 
-static int mstmm_sweep_tangent_answer_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_tangent_column_solution_call(int n, const real *const *in, real *const *out)
 {
-    return mstmm_sweep_tangent_answer(n, in[0], in[1], in[2], in[3], out[0], out[1]);
+    return mstmm_sweep_tangent_column_solution(n, in[0], in[1], in[2], in[3], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_tangent_answer_inputs[] = {
+static const mstmm_port mstmm_sweep_tangent_column_solution_inputs[] = {
     {"B", 9, "", 0, 1},
     {"gain", 9, "", 0, 1},
     {"y", 1, "", 0, 1},
     {"z_c", 9, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_tangent_answer_outputs[] = {
+static const mstmm_port mstmm_sweep_tangent_column_solution_outputs[] = {
     {"x", 1, "", 0, 1},
     {"z", 9, "", 0, 0},
 };
@@ -1723,7 +1724,7 @@ static const mstmm_port mstmm_sweep_tangent_answer_outputs[] = {
  * out z[9] change of the body's motion, own axes
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_tangent_displaced_sized(int n, const real *restrict B, const real *restrict x,
+int mstmm_sweep_tangent_port_motion_sized(int n, const real *restrict B, const real *restrict x,
     const real *restrict z_c, real *restrict z)
 {
     real t1 = 0;
@@ -1792,30 +1793,30 @@ int mstmm_sweep_tangent_displaced_sized(int n, const real *restrict B, const rea
     return 0;
 }
 
-int mstmm_sweep_tangent_displaced(int n, const real *restrict B, const real *restrict x,
+int mstmm_sweep_tangent_port_motion(int n, const real *restrict B, const real *restrict x,
     const real *restrict z_c, real *restrict z)
 {
     switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_tangent_displaced_sized(1, B, x, z_c, z);
-    case 2: return mstmm_sweep_tangent_displaced_sized(2, B, x, z_c, z);
-    case 3: return mstmm_sweep_tangent_displaced_sized(3, B, x, z_c, z);
-    case 4: return mstmm_sweep_tangent_displaced_sized(4, B, x, z_c, z);
-    default: return mstmm_sweep_tangent_displaced_sized(n, B, x, z_c, z);
+    case 1: return mstmm_sweep_tangent_port_motion_sized(1, B, x, z_c, z);
+    case 2: return mstmm_sweep_tangent_port_motion_sized(2, B, x, z_c, z);
+    case 3: return mstmm_sweep_tangent_port_motion_sized(3, B, x, z_c, z);
+    case 4: return mstmm_sweep_tangent_port_motion_sized(4, B, x, z_c, z);
+    default: return mstmm_sweep_tangent_port_motion_sized(n, B, x, z_c, z);
     }
 }
 
-static int mstmm_sweep_tangent_displaced_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_tangent_port_motion_call(int n, const real *const *in, real *const *out)
 {
-    return mstmm_sweep_tangent_displaced(n, in[0], in[1], in[2], out[0]);
+    return mstmm_sweep_tangent_port_motion(n, in[0], in[1], in[2], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_tangent_displaced_inputs[] = {
+static const mstmm_port mstmm_sweep_tangent_port_motion_inputs[] = {
     {"B", 9, "", 0, 1},
     {"x", 1, "", 0, 1},
     {"z_c", 9, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_tangent_displaced_outputs[] = {
+static const mstmm_port mstmm_sweep_tangent_port_motion_outputs[] = {
     {"z", 9, "", 0, 0},
 };
 
@@ -1829,9 +1830,9 @@ static const mstmm_port mstmm_sweep_tangent_displaced_outputs[] = {
  * out work[n][n] factor L, D of solve
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_tangent_lag_sized(int n, const real *restrict sq, const real *restrict kappa,
-    const real *restrict one, const real *restrict g_q, real *restrict A, real *restrict Q,
-    real *restrict work)
+int mstmm_sweep_tangent_increment_matrix_sized(int n, const real *restrict sq,
+    const real *restrict kappa, const real *restrict one, const real *restrict g_q,
+    real *restrict A, real *restrict Q, real *restrict work)
 {
     for (int k = 0; k < n; ++k) {
         for (int l = 0; l < n; ++l) {
@@ -1848,38 +1849,38 @@ int mstmm_sweep_tangent_lag_sized(int n, const real *restrict sq, const real *re
     return 0;
 }
 
-int mstmm_sweep_tangent_lag(int n, const real *restrict sq, const real *restrict kappa,
+int mstmm_sweep_tangent_increment_matrix(int n, const real *restrict sq, const real *restrict kappa,
     const real *restrict one, const real *restrict g_q, real *restrict A, real *restrict Q,
     real *restrict work)
 {
     switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_tangent_lag_sized(1, sq, kappa, one, g_q, A, Q, work);
-    case 2: return mstmm_sweep_tangent_lag_sized(2, sq, kappa, one, g_q, A, Q, work);
-    case 3: return mstmm_sweep_tangent_lag_sized(3, sq, kappa, one, g_q, A, Q, work);
-    case 4: return mstmm_sweep_tangent_lag_sized(4, sq, kappa, one, g_q, A, Q, work);
-    default: return mstmm_sweep_tangent_lag_sized(n, sq, kappa, one, g_q, A, Q, work);
+    case 1: return mstmm_sweep_tangent_increment_matrix_sized(1, sq, kappa, one, g_q, A, Q, work);
+    case 2: return mstmm_sweep_tangent_increment_matrix_sized(2, sq, kappa, one, g_q, A, Q, work);
+    case 3: return mstmm_sweep_tangent_increment_matrix_sized(3, sq, kappa, one, g_q, A, Q, work);
+    case 4: return mstmm_sweep_tangent_increment_matrix_sized(4, sq, kappa, one, g_q, A, Q, work);
+    default: return mstmm_sweep_tangent_increment_matrix_sized(n, sq, kappa, one, g_q, A, Q, work);
     }
 }
 
-static int mstmm_sweep_tangent_lag_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_tangent_increment_matrix_call(int n, const real *const *in, real *const *out)
 {
-    return mstmm_sweep_tangent_lag(n, in[0], in[1], in[2], in[3], out[0], out[1], out[2]);
+    return mstmm_sweep_tangent_increment_matrix(n, in[0], in[1], in[2], in[3], out[0], out[1], out[2]);
 }
 
-static const mstmm_port mstmm_sweep_tangent_lag_inputs[] = {
+static const mstmm_port mstmm_sweep_tangent_increment_matrix_inputs[] = {
     {"sq", 1, "1/s", 0, 0},
     {"kappa", 1, "", 0, 0},
     {"one", 1, "", 0, 2},
     {"g_q", 1, "", 0, 2},
 };
 
-static const mstmm_port mstmm_sweep_tangent_lag_outputs[] = {
+static const mstmm_port mstmm_sweep_tangent_increment_matrix_outputs[] = {
     {"A", 1, "", 0, 2},
     {"Q", 1, "", 0, 2},
     {"work", 1, "", 0, 2},
 };
 
-static const mstmm_guard mstmm_sweep_tangent_lag_guards[] = {
+static const mstmm_guard mstmm_sweep_tangent_increment_matrix_guards[] = {
     {1, "a pivot of A vanishes: a motion is undetermined"},
     {2, "the determinant is negative; all results are there"},
 };
@@ -1890,8 +1891,8 @@ static const mstmm_guard mstmm_sweep_tangent_lag_guards[] = {
  * out dq[n] change of the coordinates
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_tangent_lagged_sized(int n, const real *restrict Q, const real *restrict rate,
-    real *restrict dq)
+int mstmm_sweep_tangent_coordinate_increment_sized(int n, const real *restrict Q,
+    const real *restrict rate, real *restrict dq)
 {
     for (int k = 0; k < n; ++k) {
         real t1 = 0;
@@ -1904,29 +1905,29 @@ int mstmm_sweep_tangent_lagged_sized(int n, const real *restrict Q, const real *
     return 0;
 }
 
-int mstmm_sweep_tangent_lagged(int n, const real *restrict Q, const real *restrict rate,
-    real *restrict dq)
+int mstmm_sweep_tangent_coordinate_increment(int n, const real *restrict Q,
+    const real *restrict rate, real *restrict dq)
 {
     switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_tangent_lagged_sized(1, Q, rate, dq);
-    case 2: return mstmm_sweep_tangent_lagged_sized(2, Q, rate, dq);
-    case 3: return mstmm_sweep_tangent_lagged_sized(3, Q, rate, dq);
-    case 4: return mstmm_sweep_tangent_lagged_sized(4, Q, rate, dq);
-    default: return mstmm_sweep_tangent_lagged_sized(n, Q, rate, dq);
+    case 1: return mstmm_sweep_tangent_coordinate_increment_sized(1, Q, rate, dq);
+    case 2: return mstmm_sweep_tangent_coordinate_increment_sized(2, Q, rate, dq);
+    case 3: return mstmm_sweep_tangent_coordinate_increment_sized(3, Q, rate, dq);
+    case 4: return mstmm_sweep_tangent_coordinate_increment_sized(4, Q, rate, dq);
+    default: return mstmm_sweep_tangent_coordinate_increment_sized(n, Q, rate, dq);
     }
 }
 
-static int mstmm_sweep_tangent_lagged_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_tangent_coordinate_increment_call(int n, const real *const *in, real *const *out)
 {
-    return mstmm_sweep_tangent_lagged(n, in[0], in[1], out[0]);
+    return mstmm_sweep_tangent_coordinate_increment(n, in[0], in[1], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_tangent_lagged_inputs[] = {
+static const mstmm_port mstmm_sweep_tangent_coordinate_increment_inputs[] = {
     {"Q", 1, "", 0, 2},
     {"rate", 1, "", 0, 1},
 };
 
-static const mstmm_port mstmm_sweep_tangent_lagged_outputs[] = {
+static const mstmm_port mstmm_sweep_tangent_coordinate_increment_outputs[] = {
     {"dq", 1, "", 0, 1},
 };
 
@@ -3366,7 +3367,7 @@ static const mstmm_guard mstmm_sweep_tangent_placed_node_guards[] = {
  * out Z_x[n][n], added to what is there
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_tangent_placed_absorb_sized(int n, const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_tangent_placed_port_sized(int n, const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict B_p, const real *restrict S_p,
     const real *restrict T_p, real *restrict K, real *restrict Z_p, real *restrict Z_x)
 {
@@ -4166,25 +4167,25 @@ int mstmm_sweep_tangent_placed_absorb_sized(int n, const real *restrict Rc, cons
     return 0;
 }
 
-int mstmm_sweep_tangent_placed_absorb(int n, const real *restrict Rc, const real *restrict r,
+int mstmm_sweep_tangent_placed_port(int n, const real *restrict Rc, const real *restrict r,
     const real *restrict H, const real *restrict B_p, const real *restrict S_p,
     const real *restrict T_p, real *restrict K, real *restrict Z_p, real *restrict Z_x)
 {
     switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_tangent_placed_absorb_sized(1, Rc, r, H, B_p, S_p, T_p, K, Z_p, Z_x);
-    case 2: return mstmm_sweep_tangent_placed_absorb_sized(2, Rc, r, H, B_p, S_p, T_p, K, Z_p, Z_x);
-    case 3: return mstmm_sweep_tangent_placed_absorb_sized(3, Rc, r, H, B_p, S_p, T_p, K, Z_p, Z_x);
-    case 4: return mstmm_sweep_tangent_placed_absorb_sized(4, Rc, r, H, B_p, S_p, T_p, K, Z_p, Z_x);
-    default: return mstmm_sweep_tangent_placed_absorb_sized(n, Rc, r, H, B_p, S_p, T_p, K, Z_p, Z_x);
+    case 1: return mstmm_sweep_tangent_placed_port_sized(1, Rc, r, H, B_p, S_p, T_p, K, Z_p, Z_x);
+    case 2: return mstmm_sweep_tangent_placed_port_sized(2, Rc, r, H, B_p, S_p, T_p, K, Z_p, Z_x);
+    case 3: return mstmm_sweep_tangent_placed_port_sized(3, Rc, r, H, B_p, S_p, T_p, K, Z_p, Z_x);
+    case 4: return mstmm_sweep_tangent_placed_port_sized(4, Rc, r, H, B_p, S_p, T_p, K, Z_p, Z_x);
+    default: return mstmm_sweep_tangent_placed_port_sized(n, Rc, r, H, B_p, S_p, T_p, K, Z_p, Z_x);
     }
 }
 
-static int mstmm_sweep_tangent_placed_absorb_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_tangent_placed_port_call(int n, const real *const *in, real *const *out)
 {
-    return mstmm_sweep_tangent_placed_absorb(n, in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1], out[2]);
+    return mstmm_sweep_tangent_placed_port(n, in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1], out[2]);
 }
 
-static const mstmm_port mstmm_sweep_tangent_placed_absorb_inputs[] = {
+static const mstmm_port mstmm_sweep_tangent_placed_port_inputs[] = {
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"H", 6, "", 0, 1},
@@ -4193,7 +4194,7 @@ static const mstmm_port mstmm_sweep_tangent_placed_absorb_inputs[] = {
     {"T_p", 54, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_tangent_placed_absorb_outputs[] = {
+static const mstmm_port mstmm_sweep_tangent_placed_port_outputs[] = {
     {"K", 6, "", 1, 1},
     {"Z_p", 9, "", 1, 1},
     {"Z_x", 1, "", 1, 2},
@@ -4207,8 +4208,8 @@ static const mstmm_port mstmm_sweep_tangent_placed_absorb_outputs[] = {
  * out y[n] the remainder of the rows, added to what is there
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_tangent_placed_left_sized(int n, const real *restrict gain, const real *restrict p,
-    real *restrict y)
+int mstmm_sweep_tangent_placed_remainder_sized(int n, const real *restrict gain,
+    const real *restrict p, real *restrict y)
 {
     for (int k = 0; k < n; ++k) {
         const real t0 = p[0] * gain[9 * k];
@@ -4234,29 +4235,29 @@ int mstmm_sweep_tangent_placed_left_sized(int n, const real *restrict gain, cons
     return 0;
 }
 
-int mstmm_sweep_tangent_placed_left(int n, const real *restrict gain, const real *restrict p,
+int mstmm_sweep_tangent_placed_remainder(int n, const real *restrict gain, const real *restrict p,
     real *restrict y)
 {
     switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_tangent_placed_left_sized(1, gain, p, y);
-    case 2: return mstmm_sweep_tangent_placed_left_sized(2, gain, p, y);
-    case 3: return mstmm_sweep_tangent_placed_left_sized(3, gain, p, y);
-    case 4: return mstmm_sweep_tangent_placed_left_sized(4, gain, p, y);
-    default: return mstmm_sweep_tangent_placed_left_sized(n, gain, p, y);
+    case 1: return mstmm_sweep_tangent_placed_remainder_sized(1, gain, p, y);
+    case 2: return mstmm_sweep_tangent_placed_remainder_sized(2, gain, p, y);
+    case 3: return mstmm_sweep_tangent_placed_remainder_sized(3, gain, p, y);
+    case 4: return mstmm_sweep_tangent_placed_remainder_sized(4, gain, p, y);
+    default: return mstmm_sweep_tangent_placed_remainder_sized(n, gain, p, y);
     }
 }
 
-static int mstmm_sweep_tangent_placed_left_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_tangent_placed_remainder_call(int n, const real *const *in, real *const *out)
 {
-    return mstmm_sweep_tangent_placed_left(n, in[0], in[1], out[0]);
+    return mstmm_sweep_tangent_placed_remainder(n, in[0], in[1], out[0]);
 }
 
-static const mstmm_port mstmm_sweep_tangent_placed_left_inputs[] = {
+static const mstmm_port mstmm_sweep_tangent_placed_remainder_inputs[] = {
     {"gain", 9, "", 0, 1},
     {"p", 9, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_tangent_placed_left_outputs[] = {
+static const mstmm_port mstmm_sweep_tangent_placed_remainder_outputs[] = {
     {"y", 1, "", 1, 1},
 };
 
@@ -4286,74 +4287,74 @@ static const mstmm_kernel mstmm_sweep_tangent_kernels[] = {
         .guards = mstmm_sweep_tangent_node_guards,
     },
     {
-        .name = "absorb",
-        .function = (void (*)(void))mstmm_sweep_tangent_absorb,
-        .call = mstmm_sweep_tangent_absorb_call,
+        .name = "assemble_port",
+        .function = (void (*)(void))mstmm_sweep_tangent_assemble_port,
+        .call = mstmm_sweep_tangent_assemble_port_call,
         .n_inputs = 8,
         .n_outputs = 4,
-        .inputs = mstmm_sweep_tangent_absorb_inputs,
-        .outputs = mstmm_sweep_tangent_absorb_outputs,
-        .ir_hash = "58d4f081a0a0d48d59b6cc77a64b9df159e58620288a906c0bff2989f4c2931b",
+        .inputs = mstmm_sweep_tangent_assemble_port_inputs,
+        .outputs = mstmm_sweep_tangent_assemble_port_outputs,
+        .ir_hash = "7666738e800fbfeb1b71f07e8bc29444e85aa681262650b08e119ae701577432",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "push",
-        .function = (void (*)(void))mstmm_sweep_tangent_push,
-        .call = mstmm_sweep_tangent_push_call,
+        .name = "column_load",
+        .function = (void (*)(void))mstmm_sweep_tangent_column_load,
+        .call = mstmm_sweep_tangent_column_load_call,
         .n_inputs = 5,
         .n_outputs = 4,
-        .inputs = mstmm_sweep_tangent_push_inputs,
-        .outputs = mstmm_sweep_tangent_push_outputs,
-        .ir_hash = "93fa07371f995f9d67c5dce886a735090d30820051959988ec306d2070159cd4",
+        .inputs = mstmm_sweep_tangent_column_load_inputs,
+        .outputs = mstmm_sweep_tangent_column_load_outputs,
+        .ir_hash = "b6e69234c0e309fcda7ee9e717260f289f44f16cbfdab8de086eeeb6b7dbf817",
         .n_guards = 2,
-        .guards = mstmm_sweep_tangent_push_guards,
+        .guards = mstmm_sweep_tangent_column_load_guards,
     },
     {
-        .name = "answer",
-        .function = (void (*)(void))mstmm_sweep_tangent_answer,
-        .call = mstmm_sweep_tangent_answer_call,
+        .name = "column_solution",
+        .function = (void (*)(void))mstmm_sweep_tangent_column_solution,
+        .call = mstmm_sweep_tangent_column_solution_call,
         .n_inputs = 4,
         .n_outputs = 2,
-        .inputs = mstmm_sweep_tangent_answer_inputs,
-        .outputs = mstmm_sweep_tangent_answer_outputs,
-        .ir_hash = "47b3b2bfbf2a0ace5733dd01230cb59ea289dd723de4289f8c793054b79e71da",
+        .inputs = mstmm_sweep_tangent_column_solution_inputs,
+        .outputs = mstmm_sweep_tangent_column_solution_outputs,
+        .ir_hash = "0c2c559f62e70ae12b5a741f8a8b24e1d788aee543f3274086597519cb7dcf96",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "displaced",
-        .function = (void (*)(void))mstmm_sweep_tangent_displaced,
-        .call = mstmm_sweep_tangent_displaced_call,
+        .name = "port_motion",
+        .function = (void (*)(void))mstmm_sweep_tangent_port_motion,
+        .call = mstmm_sweep_tangent_port_motion_call,
         .n_inputs = 3,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_tangent_displaced_inputs,
-        .outputs = mstmm_sweep_tangent_displaced_outputs,
-        .ir_hash = "72a52d8a7c3d848f8dc25a427ecef231d723182ef8d6d3ebde956fe37fd7d316",
+        .inputs = mstmm_sweep_tangent_port_motion_inputs,
+        .outputs = mstmm_sweep_tangent_port_motion_outputs,
+        .ir_hash = "0659969158f78cdd60943014cc29191ff98d93768b75182148d7bac811ce2509",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "lag",
-        .function = (void (*)(void))mstmm_sweep_tangent_lag,
-        .call = mstmm_sweep_tangent_lag_call,
+        .name = "increment_matrix",
+        .function = (void (*)(void))mstmm_sweep_tangent_increment_matrix,
+        .call = mstmm_sweep_tangent_increment_matrix_call,
         .n_inputs = 4,
         .n_outputs = 3,
-        .inputs = mstmm_sweep_tangent_lag_inputs,
-        .outputs = mstmm_sweep_tangent_lag_outputs,
-        .ir_hash = "3b47269de2f407556476c1d5c6a2873591c152a6a458d76748533471b57fec90",
+        .inputs = mstmm_sweep_tangent_increment_matrix_inputs,
+        .outputs = mstmm_sweep_tangent_increment_matrix_outputs,
+        .ir_hash = "d8e393901010e719c97ca2d5a0b66c4b8efc87d5399cdee4e868db3af72dec17",
         .n_guards = 2,
-        .guards = mstmm_sweep_tangent_lag_guards,
+        .guards = mstmm_sweep_tangent_increment_matrix_guards,
     },
     {
-        .name = "lagged",
-        .function = (void (*)(void))mstmm_sweep_tangent_lagged,
-        .call = mstmm_sweep_tangent_lagged_call,
+        .name = "coordinate_increment",
+        .function = (void (*)(void))mstmm_sweep_tangent_coordinate_increment,
+        .call = mstmm_sweep_tangent_coordinate_increment_call,
         .n_inputs = 2,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_tangent_lagged_inputs,
-        .outputs = mstmm_sweep_tangent_lagged_outputs,
-        .ir_hash = "50f68ad42d538d89f5dca10b929db9b28834cfeb73a1495e052e75b92af1084f",
+        .inputs = mstmm_sweep_tangent_coordinate_increment_inputs,
+        .outputs = mstmm_sweep_tangent_coordinate_increment_outputs,
+        .ir_hash = "22ad08c5df2eb3da8127bcfd89ac262f28d3f5e927b8a330ed7221ad4133faba",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4406,26 +4407,26 @@ static const mstmm_kernel mstmm_sweep_tangent_kernels[] = {
         .guards = mstmm_sweep_tangent_placed_node_guards,
     },
     {
-        .name = "placed_absorb",
-        .function = (void (*)(void))mstmm_sweep_tangent_placed_absorb,
-        .call = mstmm_sweep_tangent_placed_absorb_call,
+        .name = "placed_port",
+        .function = (void (*)(void))mstmm_sweep_tangent_placed_port,
+        .call = mstmm_sweep_tangent_placed_port_call,
         .n_inputs = 6,
         .n_outputs = 3,
-        .inputs = mstmm_sweep_tangent_placed_absorb_inputs,
-        .outputs = mstmm_sweep_tangent_placed_absorb_outputs,
-        .ir_hash = "396c7eae507dff6d9d48969ba41934dfed2a6beb86f6de36ae4416b45b4e17a1",
+        .inputs = mstmm_sweep_tangent_placed_port_inputs,
+        .outputs = mstmm_sweep_tangent_placed_port_outputs,
+        .ir_hash = "df4cd73080b2c8d5fe075b2f6ce46a3260023ed32f97f4a30d34cc04a364bed3",
         .n_guards = 0,
         .guards = NULL,
     },
     {
-        .name = "placed_left",
-        .function = (void (*)(void))mstmm_sweep_tangent_placed_left,
-        .call = mstmm_sweep_tangent_placed_left_call,
+        .name = "placed_remainder",
+        .function = (void (*)(void))mstmm_sweep_tangent_placed_remainder,
+        .call = mstmm_sweep_tangent_placed_remainder_call,
         .n_inputs = 2,
         .n_outputs = 1,
-        .inputs = mstmm_sweep_tangent_placed_left_inputs,
-        .outputs = mstmm_sweep_tangent_placed_left_outputs,
-        .ir_hash = "dafc9d3445050c0b3a8653de927ece7a89c146e45dc34daf371e581332bdaeee",
+        .inputs = mstmm_sweep_tangent_placed_remainder_inputs,
+        .outputs = mstmm_sweep_tangent_placed_remainder_outputs,
+        .ir_hash = "23b50e2046b2e3aab157da9682e8e133b60433cc1e342b9cc5f04ef65cd954b4",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -4435,7 +4436,7 @@ const mstmm_element mstmm_sweep_tangent = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "tangent",
-    .hash = "a25d08a15efaebb5a28a72433479e17af8317b7bc37a4ea0f390f1c5d7a2f17f",
+    .hash = "34acbc90a61da2a7ab7398f164c7f41cab228147189544c97a480de3d040daf2",
     .nq = 0,
     .nu = 0,
     .np = 0,

@@ -120,7 +120,6 @@ class AssessedResult(NotebookDisplay):
         """True if no risk is an objection to the numbers."""
         return not any(risk.invalidates for risk in self.risks)
 
-    @property
     def verdict(self) -> str:
         """Whether the answer can be trusted, and if not why, in one sentence."""
         objections = [risk for risk in self.risks if risk.invalidates]
@@ -136,7 +135,7 @@ class AssessedResult(NotebookDisplay):
         }  # fmt: skip
 
     def _repr_html_(self) -> str:
-        return f"<p>{text(repr(self))}</p><p>{text(self.verdict)}</p>{bullets(self.warnings)}"
+        return f"<p>{text(repr(self))}</p><p>{text(self.verdict())}</p>{bullets(self.warnings)}"
 
 
 def to_rows(risks: Iterable[Risk]) -> list[dict[str, Any]]:

@@ -14,7 +14,8 @@ from mstmm.ir.differentiation import derivatives
 from mstmm.ir.graph import Graph, Node
 from mstmm.ir.inline import Inliner, Nodes, element_nodes
 
-from ..equations import riccati_sweep, tangent_hinge_elimination
+from ..equations import riccati_sweep
+from ..equations import tangent_hinge_elimination as hinge_tangent
 from ..lower.kernel_lowering import lower
 
 #: Outputs of the hinge kernel that have a directional derivative in the generic steps.
@@ -22,13 +23,13 @@ _CHANGED_OUTPUTS = ("H", "v", "w", "c")
 
 
 def across_kernels(hinge: KernelIR) -> Iterator[KernelIR]:
-    """`forward_kept` of a hinge, and `directions` if it has speeds, from its kernel "hinge"."""
-    yield forward_kept(hinge)
+    """`body_motion` of a hinge, and `directions` if it has speeds, from its kernel "hinge"."""
+    yield body_motion(hinge)
     if _port_length(hinge, "u"):
         yield directions(hinge)
 
 
-def forward_kept(hinge: KernelIR) -> KernelIR:
+def body_motion(hinge: KernelIR) -> KernelIR:
     """Motion across a hinge and of the outboard body (`forward_generic`)."""
     forward = _forward_kernel(_port_length(hinge, "u"))
     graph = Graph()
@@ -39,7 +40,7 @@ def forward_kept(hinge: KernelIR) -> KernelIR:
     )
     outputs = [*hinge.outputs, *forward.outputs]
     return graph.kernel(
-        "forward_kept", (*hinge.inputs, *more), outputs,
+        "body_motion", (*hinge.inputs, *more), outputs,
         _nested_values(outputs, nodes | body_nodes),
         purpose="motion across the hinge and of its outboard body", sources=hinge.sources,
     )  # fmt: skip
@@ -57,7 +58,7 @@ def directions(hinge: KernelIR) -> KernelIR:
     inputs = [
         Port("s", (nu,), "", "accelerations of the speeds"),
         Port("motion", (9,), "", "w, wd, and a of the body, own axes"),
-        Port("f", (6,), "N, N*m", "load at P that is carried"),
+        Port("f", (6,), "N, N*m", "carried load at P"),
         Port("J", (nu,), "kg*m2 or kg", "rotor inertia reflected to the speeds"),
         Port("laws", (nu, nu), "", "change of the laws' efforts, a row a direction"),
         Port("along", (nu, nq), "", "change of the coordinates, a row a direction"),
@@ -72,7 +73,7 @@ def directions(hinge: KernelIR) -> KernelIR:
             rows[name].append(row)
     outputs = [
         Port("B", (nu, 9), "", "motion along the unknowns, a row a direction"),
-        Port("G", (nu, 6), "", "change of the load that is carried"),
+        Port("G", (nu, 6), "", "change of the carried load"),
         Port("W", (nu, nu), "", "slopes of the rows by load, rotors and laws"),
         next(port for port in hinge.outputs if port.name == "H"),
     ]
@@ -150,19 +151,19 @@ def _forward_kernel(nu: int) -> KernelIR:
 
 @cache
 def _carrier_kernel(nu: int) -> KernelIR:
-    return lower(tangent_hinge_elimination.tangent_carrier(nu), "tangent_carrier")
+    return lower(hinge_tangent.tangent_carrier(nu), "tangent_carrier")
 
 
 @cache
 def _column_kernel(nu: int) -> KernelIR:
-    return lower(tangent_hinge_elimination.tangent_column(nu), "tangent_column")
+    return lower(hinge_tangent.tangent_column(nu), "tangent_column")
 
 
 @cache
 def _along_kernel(nu: int) -> KernelIR:
-    return lower(tangent_hinge_elimination.tangent_along(nu), "tangent_along")
+    return lower(hinge_tangent.tangent_coordinate_change(nu), "tangent_coordinate_change")
 
 
 @cache
 def _rotation_kernel() -> KernelIR:
-    return lower(tangent_hinge_elimination.tangent_turned(), "tangent_turned")
+    return lower(hinge_tangent.tangent_pose_change(), "tangent_pose_change")

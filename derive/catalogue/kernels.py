@@ -53,34 +53,34 @@ FRAME_DERIVATIONS = (
     kinematics.pose,
     kinematics.velocity,
     kinematics.point,
-    kinematics.turning,
+    kinematics.angular_motion,
     kinematics.end_frame,
     kinematics.applied_load,
-    kinematics.opposite,
+    kinematics.reaction_wrench,
     kinematics.power,
     kinematics.momentum,
     kinematics.carried_momentum,
     kinematics.gravity_energy,
     kinematics.pivot_floor,
     kinematics.reaction,
-    kinematics.moment_at,
+    kinematics.moment_about,
     kinematics.transport,
     kinematics.rotor_energy,
     kinematics.driven_effort,
     kinematics.speed_power,
     kinematics.length,
-    kinematics.turned,
+    kinematics.to_inertial,
     kinematics.classical_body,
     kinematics.state_deviation,
     tangent_sweep.tangent_carry,
-    tangent_sweep.tangent_moved,
-    tangent_hinge_elimination.tangent_turned,
-    tangent_sweep.tangent_known,
-    placed.placed_moved,
+    tangent_sweep.tangent_motion,
+    tangent_hinge_elimination.tangent_pose_change,
+    tangent_sweep.tangent_known_load,
+    placed.placed_displacement,
     placed.placed_pose,
     placed.placed_column,
     placed.placed_carry,
-    placed.placed_known,
+    placed.placed_known_load,
 )
 
 #: Tangent steps for hinges with any number of speeds, and for hinges with at least one.
@@ -89,15 +89,15 @@ _TANGENT_STEPS = (
     tangent_hinge_elimination.tangent_column,
 )
 _TANGENT_SPEED_STEPS = (
-    tangent_hinge_elimination.tangent_along,
+    tangent_hinge_elimination.tangent_coordinate_change,
     tangent_hinge_elimination.tangent_steady,
-    tangent_hinge_elimination.tangent_turning,
+    tangent_hinge_elimination.tangent_rotational,
     tangent_hinge_elimination.tangent_rows,
     tangent_hinge_elimination.tangent_reduce,
-    tangent_hinge_elimination.tangent_push,
-    tangent_hinge_elimination.tangent_answer,
-    tangent_hinge_elimination.tangent_push_known,
-    tangent_hinge_elimination.tangent_answer_known,
+    tangent_hinge_elimination.tangent_load,
+    tangent_hinge_elimination.tangent_solution,
+    tangent_hinge_elimination.tangent_load_with_increments,
+    tangent_hinge_elimination.tangent_solution_with_increments,
 )
 
 #: Largest number of speeds of a hinge.
@@ -177,16 +177,16 @@ def generic_kernels(nu: int) -> tuple[Kernel, ...]:
         Kernel("effort", riccati_sweep.effort(nu)),
         Kernel("project", riccati_sweep.project(nu)),
         Kernel("factor", multiple_right_hand_sides.factor(nu), riccati_sweep.pivot_guards(nu)),
-        Kernel("push", multiple_right_hand_sides.column_load(nu)),
-        Kernel("answer", multiple_right_hand_sides.column_acceleration(nu)),
+        Kernel("column_load", multiple_right_hand_sides.column_load(nu)),
+        Kernel("column_acceleration", multiple_right_hand_sides.column_acceleration(nu)),
         Kernel("qr_eliminate", qr_sweep.qr_eliminate(nu), qr_sweep.qr_guards(nu)),
         *(Kernel(make.__name__, make(nu)) for make in _TANGENT_STEPS),
         *(Kernel(make.__name__, make(nu)) for make in _TANGENT_SPEED_STEPS if nu),
         Kernel("complement", complement(nu)),
         *(Kernel(make.__name__, make(nu)) for make in loop_closure.OF_SPEEDS if nu),
-        *((Kernel("exerted", riccati_sweep.required_load(nu)),) if nu else ()),
+        *((Kernel("required_load", riccati_sweep.required_load(nu)),) if nu else ()),
         *(
-            (Kernel("push_on_ground", multiple_right_hand_sides.ground_column_load(nu)),)
+            (Kernel("ground_column_load", multiple_right_hand_sides.ground_column_load(nu)),)
             if nu
             else ()
         ),
@@ -221,7 +221,7 @@ def qr_kernels() -> tuple[Kernel, ...]:
     """Kernels of the least-squares sweep, except the elimination of hinges."""
     return tuple(
         Kernel(make.__name__, make())
-        for make in (qr_sweep.factor, qr_sweep.bias, qr_sweep.merge, qr_sweep.restored)
+        for make in (qr_sweep.factor, qr_sweep.bias, qr_sweep.merge, qr_sweep.rows_to_riccati)
     )
 
 
@@ -289,10 +289,10 @@ def modal_kernels() -> tuple[Kernel, ...]:
         Kernel("momentum", modal_residual.momentum()),
         Kernel("strain_energy", modal_residual.strain_energy()),
         Kernel("section", section.section()),
-        Kernel("outward", section.outward(), turns),
-        Kernel("inward", section.inward(), turns),
+        Kernel("end_motion", section.end_motion(), turns),
+        Kernel("frame_motion", section.frame_motion(), turns),
         Kernel("subspace", section.subspace()),
-        Kernel("imposed", section.prescribed_bias()),
+        Kernel("prescribed_bias", section.prescribed_bias()),
         *(
             Kernel(step.__name__, step())
             for step in (*modal_sweep.STEPS, *modal_constraint_rows.STEPS)
@@ -307,18 +307,18 @@ def tangent_kernels() -> tuple[Kernel, ...]:
         for make in (
             tangent_sweep.invert,
             tangent_sweep.node,
-            tangent_sweep.absorb,
-            tangent_sweep.push,
-            tangent_sweep.answer,
-            tangent_sweep.displaced,
-            tangent_sweep.lag,
-            tangent_sweep.lagged,
+            tangent_sweep.assemble_port,
+            tangent_sweep.column_load,
+            tangent_sweep.column_solution,
+            tangent_sweep.port_motion,
+            tangent_sweep.increment_matrix,
+            tangent_sweep.coordinate_increment,
             placed.placed_rows,
             placed.placed_own,
             placed.placed_reduce,
             placed.placed_node,
-            placed.placed_absorb,
-            placed.placed_left,
+            placed.placed_port,
+            placed.placed_remainder,
         )
     )
 

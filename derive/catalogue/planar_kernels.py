@@ -15,7 +15,7 @@ from mstmm.ir.element_spec import ElementSpec
 from mstmm.ir.graph import Graph, Node
 from mstmm.ir.inline import Nodes, element_nodes, specialise
 
-from ..schedule.planar_passes import LOAD
+from ..schedule.planar_passes import LOAD, PLANAR_KERNELS
 
 #: In-plane entries of S, and of a direction in every row of W.
 _MASS = (0, 1, 5, 6, 10, 20)
@@ -39,19 +39,11 @@ _IN_PLANE_ENTRIES: dict[tuple[str, int], tuple[int, ...]] = {
 _ROTATIONS = ("Rt", "Rc", "R_C", "A", "A_I", "A_C", "A_B")
 #: Inputs that are zero, by kernel: position across a pin and its prescribed motion, end deviations.
 _ZERO = {
-    "forward": "s", "velocity": "v_rel", "point": "delta gravity", "turning": "delta",
+    "forward": "s", "velocity": "v_rel", "point": "delta gravity", "angular_motion": "delta",
     "factor": "W",
 }  # fmt: skip
 #: Outputs that are never used: P of a pin coincides with its inboard point.
-_UNUSED_OUTPUTS = {"forward": "r", "point": "a_K", "turning": "alpha_K"}
-#: Element -> its kernels that exist in planar form.
-_PLANAR_KERNELS: dict[tuple[str, str], str] = {
-    ("hinge", "pin"): "forward",
-    ("body", "rigid"): "inertia bias_load",
-    ("sweep", "frames"): "pose velocity point turning end_frame applied_load",
-    ("sweep", "generic1"): "factor push push_on_ground answer divide couple answered pull",
-    ("sweep", "loops"): "meet slip drift row known told act close shed multiplier_more",
-}  # fmt: skip
+_UNUSED_OUTPUTS = {"forward": "r", "point": "a_K", "angular_motion": "alpha_K"}
 
 
 def planar_spec(specs: Iterable[ElementSpec]) -> ElementSpec:
@@ -59,7 +51,7 @@ def planar_spec(specs: Iterable[ElementSpec]) -> ElementSpec:
     spec_by_key = {(spec.kind, spec.name): spec for spec in specs}
     kernels = tuple(
         _planar_kernel(kernel)
-        for key, names in _PLANAR_KERNELS.items()
+        for key, names in PLANAR_KERNELS.values()
         for kernel in spec_by_key[key].kernels
         if kernel.name in names.split()
     )

@@ -17,10 +17,10 @@ from mstmm.ir.element_spec import ElementSpec
 
 from ..schedule.pass_steps import Call, Pass, all_steps
 from ..schedule.tangent_sweep import (
-    TANGENT_ANSWERED,
-    TANGENT_CARRIED,
+    TANGENT_BACKWARD,
     TANGENT_COLUMN,
-    TANGENT_ELIMINATED,
+    TANGENT_ELIMINATION,
+    TANGENT_FORWARD,
 )
 from .kernel_calls import (
     MAX_SPEEDS,
@@ -33,14 +33,14 @@ from .kernel_calls import (
 )
 from .sweep_text import function_declaration, function_text
 
-PASSES: tuple[Pass, ...] = (TANGENT_ELIMINATED, TANGENT_COLUMN, TANGENT_CARRIED, TANGENT_ANSWERED)
+PASSES: tuple[Pass, ...] = (TANGENT_ELIMINATION, TANGENT_COLUMN, TANGENT_BACKWARD, TANGENT_FORWARD)
 #: Ports of rotations, places, velocities and subspaces of the state.
 REAL_PORTS = frozenset({"Rc", "r", "w_I", "v", "w", "H"})
 #: Variables that point to the state's numbers, and tangent slots stored there.
 _STATE_POINTERS = re.compile(r"\breal \*(?=(?:block|parent|laid|modes)\b)")
 _HELD_TANGENTS = {
     "tangent + MSTMM_TANGENT_H(": "state->tangents->held + body->tangent + MSTMM_TANGENT_H(",
-    "bend + MSTMM_BEND_STILL(": "state->tangents->held + modal->tangent + MSTMM_BEND_STILL(",
+    "bend + MSTMM_BEND_ZERO_H(": "state->tangents->held + modal->tangent + MSTMM_BEND_ZERO_H(",
 }
 _FUNCTION_NAMES = re.compile(
     r"\bmstmm_(?!tangent_at\b|modal_of\b)"

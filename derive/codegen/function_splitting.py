@@ -49,11 +49,11 @@ def find_crossing(
     departures = sorted((k, number) for number, k in last_part.items())
     index_of_number: dict[int, int] = {}
     free_indices: list[int] = []
-    width = departed = 0
+    width = n_departed = 0
     for number in sorted(last_part, key=lambda n: (part_of_number[n], n)):
-        while departures[departed][0] < part_of_number[number]:
-            free_indices.append(index_of_number[departures[departed][1]])
-            departed += 1
+        while departures[n_departed][0] < part_of_number[number]:
+            free_indices.append(index_of_number[departures[n_departed][1]])
+            n_departed += 1
         if not free_indices:
             free_indices.append(width)
             width += 1

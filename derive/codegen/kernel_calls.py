@@ -50,7 +50,7 @@ POINTER_CALLEES = {
         {
             k: k
             for k in ("hinge", "forward", "condense", "recover", "hinge_slope",
-                      "rates_by_coordinates", "rates_by_speeds", "forward_kept", "directions")
+                      "rates_by_coordinates", "rates_by_speeds", "body_motion", "directions")
         },
     ),
     "body": (
@@ -76,13 +76,13 @@ POINTER_CALLEES = {
 #: not for zero).
 MAX_SPEEDS = 6
 GENERIC_KERNELS = (
-    "forward", "condense", "recover", "effort", "exerted", "project", "factor", "push",
-    "push_on_ground", "answer",
-    "qr_eliminate", "complement", "divide", "couple", "answered", "pull",
-    "forward_slope", "effort_slope", "complement_slope", "answered_slope", "pull_slope",
-    "tangent_carrier", "tangent_column",
-    "tangent_along", "tangent_steady", "tangent_turning", "tangent_rows", "tangent_reduce",
-    "tangent_push", "tangent_answer", "tangent_push_known", "tangent_answer_known",
+    "forward", "condense", "recover", "effort", "required_load", "project", "factor", "column_load",
+    "ground_column_load", "column_acceleration", "qr_eliminate", "complement", "divide", "couple",
+    "add_known_part", "add_multiplier_effort", "forward_slope", "effort_slope", "complement_slope",
+    "add_known_part_slope", "add_multiplier_effort_slope", "tangent_carrier", "tangent_column",
+    "tangent_coordinate_change", "tangent_steady", "tangent_rotational", "tangent_rows",
+    "tangent_reduce", "tangent_load", "tangent_solution", "tangent_load_with_increments",
+    "tangent_solution_with_increments",
 )  # fmt: skip
 
 

@@ -8,7 +8,7 @@ from .slot_storage import pass_variables, reads_variable
 _TRAIT_TEXTS = {
     "own": "!(body->generic || state->required)",
     "parts": "(body->generic || state->required)", "section": "body->section",
-    "whole": "body->kernels->forward_kept && !body->section"
+    "whole": "body->kernels->body_motion && !body->section"
     " && (body->generic || state->required)",
     "directed": "body->kernels->directions && !body->placed && speeds == body->nu",
     "outward": "body->section && !body->section->inward", "modal": "body->modal",
@@ -17,8 +17,8 @@ _TRAIT_TEXTS = {
     "weightless": "state->required",
     "balance": "state->balance", "efforts": "state->efforts", "known": "state->hinges_known",
     "linked": "state->linked", "laws": "model->n_laws", "driven": "model->n_drives",
-    "valued": "model->n_values",
-    "flexible": "model->n_flexible", "posed": "(model->needs_pose || model->product)",
+    "expressions": "model->n_values",
+    "flexible": "model->n_flexible", "poses": "(model->needs_pose || model->product)",
     "driving": "(!state->given || state->residual)", "curved": "!body->straight",
     "steady": "body->steady", "placed": "body->placed", "own_load": "load->own",
     "own_force": "force->own", "from_body": "force->body_f >= 0", "to_body": "force->body_t >= 0",
@@ -26,27 +26,27 @@ _TRAIT_TEXTS = {
     "moving": "!body->section && speeds", "product": "model->product",
     "shifted": "state->tangents->shifted", "coordinate": "law->kind == 0",
     "looped": "model->looped", "cut": "looped->closure",
-    "aside": "mstmm_aside(state->model, state->observed, index)", "corrected": "state->level",
+    "omitted": "mstmm_omitted(state->model, state->observed, index)", "corrected": "state->level",
     "residual": "state->residual",
-    "shut": "state->model->looped[law->body].closure",
+    "loop_hinge": "state->model->looped[law->body].closure",
     "hinged": "closure->kind == MSTMM_HINGE",
     "distance": "closure->kind == MSTMM_DISTANCE", "plane": "closure->kind == MSTMM_PLANE",
     "rolling": "closure->kind == MSTMM_ROLLING",
     "soft": "(state->model->rows[closure->rows[c]].softness > 0)",
     "inside": "(row->body >= 0)", "refined": "state->refined", "couplings": "model->n_couplings",
-    "unmet": "(coupling->row < 0)",
+    "redundant": "(coupling->row < 0)",
     "coupled": "(pending->tau >= 0)",
-    "placing": "(state->closing > 0)",
-    "gaping": "state->level == MSTMM_GAP", "slipping": "state->level == MSTMM_SLIP",
-    "united": "state->tangents->unit",
+    "gap_closing": "(state->closing > 0)",
+    "position_gap": "state->level == MSTMM_GAP", "velocity_error": "state->level == MSTMM_SLIP",
+    "unit_load": "state->tangents->unit",
     "effort": "force->effort", "qr": "model->qr",
     "rigid": "body->kernels->rigid",
-    "hung": "(body->parent >= 0)", "kept": "(state->observed || state->balance)",
+    "on_body": "(body->parent >= 0)", "loads_read": "(state->observed || state->balance)",
 }  # fmt: skip
 
 
 #: Traits with another condition for planar scenes.
-_PLANAR_TRAIT_TEXTS = {"aside": "body->aside", "idle": "body->idle"}
+_PLANAR_TRAIT_TEXTS = {"omitted": "body->omitted", "idle": "body->idle"}
 
 
 def condition_text(when: str, flat: bool = False) -> str:

@@ -27,7 +27,7 @@ SPEED_SLOTS = {
 }  # fmt: skip
 #: Numbers of a flexible body in the workspace: slot -> (per mode, per pair of modes).
 MODE_SLOTS = {
-    "modes.S_rf": (6, 0), "modes.based": (6, 0), "modes.A": (6, 0), "modes.right": (7, 0),
+    "modes.S_rf": (6, 0), "modes.S_rf_I": (6, 0), "modes.A": (6, 0), "modes.right": (7, 0),
     "modes.gain": (7, 0), "modes.A_drag": (6, 0), "modes.S_ff": (0, 1),
     "modes.work": (0, 1), "modes.e_f": (1, 0), "modes.etadd": (1, 0),
 }  # fmt: skip
@@ -44,10 +44,10 @@ TANGENT_SLOTS = {
     "tangent.V": (0, 6, 0, 0, 0), "tangent.gain": (0, 9, 0, 0, 0),
     "tangent.inverse": (0, 0, 1, 0, 0), "tangent.y": (0, 1, 0, 0, 0),
     "tangent.known": (9, 0, 0, 0, 0),
-    "tangent.along": (0, 0, 0, 0, 1), "tangent.ways": (0, 0, 0, 0, 1),
-    "tangent.turns": (0, 0, 0, 1, 0),
+    "tangent.along": (0, 0, 0, 0, 1), "tangent.rates_by_speeds": (0, 0, 0, 0, 1),
+    "tangent.rates_by_coordinates": (0, 0, 0, 1, 0),
     "tangent.unit": (0, 0, 0, 1, 0), "tangent.rates": (0, 0, 0, 1, 0),
-    "tangent.lag": (0, 0, 0, 1, 0), "tangent.lag_work": (0, 0, 0, 1, 0),
+    "tangent.Q": (0, 0, 0, 1, 0), "tangent.Q_work": (0, 0, 0, 1, 0),
 }  # fmt: skip
 #: Numbers of the tangent of a body whose loads depend on its position.
 PLACE_SLOTS = {
@@ -56,7 +56,7 @@ PLACE_SLOTS = {
 }  # fmt: skip
 #: Numbers of the tangent by flexible body, and by section: slot -> (per mode, per pair of modes).
 BEND_SLOTS = {
-    "bend.B": (9, 0), "bend.G": (6, 0), "bend.W": (0, 1), "bend.still": (6, 0), "bend.K": (6, 0),
+    "bend.B": (9, 0), "bend.G": (6, 0), "bend.W": (0, 1), "bend.zero_H": (6, 0), "bend.K": (6, 0),
     "bend.Z_z": (9, 0), "bend.Z_x": (0, 1), "bend.V": (6, 0), "bend.D": (0, 1),
     "bend.right": (9, 0), "bend.gain": (9, 0), "bend.work": (0, 1), "bend.rest": (1, 0),
     "bend.y": (1, 0), "bend.place_B": (9, 0), "bend.place_Z": (9, 0), "bend.place_gain": (9, 0),
@@ -73,14 +73,14 @@ CLOSURE_SLOTS = {
 COUPLING_SLOTS = {f"coupling.{name}": 1 for name in scene_structure.COUPLING_NUMBERS}
 #: Numbers of a row: slot -> how many.
 ROW_SLOTS = {"row.K": 6, "row.known": 1, "row.pivot": 1, "row.inverse": 1, "row.x": 1,
-             "row.told": 1}  # fmt: skip
+             "row.previous_x": 1}  # fmt: skip
 #: Slots that share the storage of another slot, which is not needed at that time.
 SHARED_SLOTS = {
-    "hinge.F": "hinge.H", "modes.felt": "modes.right", "bend.place_right": "bend.right",
+    "hinge.F": "hinge.H", "modes.load_effort": "modes.right", "bend.place_right": "bend.right",
     "body.U": "body.S", "body.d": "body.delta",
     # Only one of the two tangents exists at a time.
     "mass.S": "tangent.S", "mass.F": "tangent.gain", "mass.G": "tangent.V",
-    "shapes.S_rf": "bend.V", "shapes.based": "bend.G", "shapes.S_ff": "bend.D",
+    "shapes.S_rf": "bend.V", "shapes.S_rf_I": "bend.G", "shapes.S_ff": "bend.D",
     "shapes.right": "bend.right", "shapes.gain": "bend.gain",
 }  # fmt: skip
 
@@ -148,7 +148,7 @@ _SLOT_TEXTS = {
     "pending.tau": "loops + pending->tau", "own.tau": "loops + own->tau",
     "own.inner": "loops + own->inner", "own.outer": "loops + own->outer",
     "coupling.x": "loops + MSTMM_ROW * (int64_t)coupling->row + MSTMM_ROW_X",
-    "coupling.told": "loops + MSTMM_ROW * (int64_t)coupling->row + MSTMM_ROW_TOLD",
+    "coupling.previous_x": "loops + MSTMM_ROW * (int64_t)coupling->row + MSTMM_ROW_PREVIOUS_X",
     "pair.L": "loops + pending->pairs[b]", "pending.modes": "loops + pending->modes",
     "bent.K": "loops + bent->column", "bent.modes": "loops + bent->modes",
     "bent.y": "loops + bent->y", "bent_before.modes": "loops + looped->bent[b].modes",
@@ -299,9 +299,9 @@ def _derivative_expression(slot: str) -> SlotExpression | None:
 #: Row index in a loop over rows, by slot.
 _ROW_INDICES = {
     "line.known": "closure->rows[c]", "line.x": "closure->rows[c]",
-    "line.told": "closure->rows[c]", "other.known": "other->row", "other.x": "other->row",
+    "line.previous_x": "closure->rows[c]", "other.known": "other->row", "other.x": "other->row",
     "pending.known": "pending->row", "pending.x": "pending->row",
-    "pending.told": "pending->row", "own.told": "own->row",
+    "pending.previous_x": "pending->row", "own.previous_x": "own->row",
     "own.known": "own->row", "own.x": "own->row",
     "bent.known": "bent->row", "bent.x": "bent->row",
 }  # fmt: skip

@@ -31,13 +31,13 @@ from .schedule_conditions import condition_text, condition_variables
 from .slot_storage import VARIABLES, SlotExpression, slot_expression, slot_size
 
 #: Traits that only scene-specific code uses.
-FUSED_ONLY_TRAITS = frozenset({"staged", "link", "turned", "unmoved"})
+FUSED_ONLY_TRAITS = frozenset({"staged", "link", "rotated", "immobile"})
 #: Directions: count, C statement that selects direction c, variables that both read.
 _DIRECTION_LOOPS = {
     "free": ("speeds", "mstmm_aim_unknown(state, body, columns[c])", ("speeds", "columns", "body")),
-    "felt": (
+    "law_inputs": (
         "speeds",
-        "if (mstmm_unfelt(body, law, columns[c])) continue;\n"
+        "if (mstmm_law_ignores(body, law, columns[c])) continue;\n"
         "mstmm_aim_unknown(state, body, columns[c])",
         ("speeds", "columns", "body", "law"),
     ),
@@ -57,7 +57,7 @@ _DIRECTION_LOOPS = {
 #: C statement that clears the selected direction.
 _DIRECTION_RESETS = {
     **dict.fromkeys(
-        ("free", "felt", "rates", "coordinates", "law"), "mstmm_aim_nowhere(state, body)"
+        ("free", "law_inputs", "rates", "coordinates", "law"), "mstmm_aim_nowhere(state, body)"
     ),
     "modes": "mstmm_aim_no_mode(state, modal)",
     **dict.fromkeys(("motion", "spin"), "mstmm_aim_motion(d_block + MSTMM_BLOCK_MOTION, -1)"),

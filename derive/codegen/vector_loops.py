@@ -18,7 +18,7 @@ from mstmm.ir import OPERATIONS, Assign, Element, KernelIR, Operand, Port, Store
 #: in which they are computed; later outputs read the values of earlier ones.
 VECTORIZED_OUTPUTS: dict[tuple[str, str], tuple[tuple[str, int], ...]] = {
     ("frames", "tangent_carry"): (("T", 1), ("S_I", 0)),
-    ("frames", "tangent_known"): (("e_S", 0), ("e_b", 0)),
+    ("frames", "tangent_known_load"): (("e_S", 0), ("e_b", 0)),
     **{(f"generic{n}", "tangent_rows"): (("K", 1), ("right", 1)) for n in range(1, 7)},
     **{(f"generic{n}", "tangent_reduce"): (("gain", 1), ("V", 1), ("S", 1)) for n in range(1, 7)},
 }

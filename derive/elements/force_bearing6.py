@@ -57,8 +57,8 @@ class Bearing(ForceElement):
     ) -> tuple[sp.Matrix, sp.Matrix]:
         symmetric = force_bushing6.Bushing().wrench(x, v, rotation, w, p, effort, t)
         first = _SYMMETRIC
-        moved = self.deflection(x, rotation, p)
-        lost = _antisymmetric(p, first) * moved
+        deflection = self.deflection(x, rotation, p)
+        lost = _antisymmetric(p, first) * deflection
         lost += _antisymmetric(p, first + len(_ABOVE)) * sp.Matrix([*v, *w])
         return symmetric[0] - lost[:3, :], symmetric[1] - lost[3:, :]
 

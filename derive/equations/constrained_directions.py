@@ -78,8 +78,8 @@ def _reflection(
     """v and b of the reflection 1 - b v v^T that maps column k to direction k."""
     size, v, b = symbol(f"size_{k + 1}", 1), symbol(f"v_{k + 1}", 6), symbol(f"b_{k + 1}", 1)
     length, first = size[0, 0], matrix[k, k]
-    away = first + sp.Piecewise((-length, first < 0), (length, True))
-    entries = [*[sp.Integer(0)] * k, away, *(matrix[i, k] for i in range(k + 1, 6))]
+    first_entry = first + sp.Piecewise((-length, first < 0), (length, True))
+    entries = [*[sp.Integer(0)] * k, first_entry, *(matrix[i, k] for i in range(k + 1, 6))]
     share = length * (length + sp.Abs(first))
     return (v, b), [
         Equation(

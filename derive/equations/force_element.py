@@ -125,13 +125,13 @@ def _deflection_equations(
     of_names = deflection.xreplace(dict(zip(x, names, strict=True)))
     derivatives = [slope(of_names, name).xreplace(values) for name in names]
     turns = [rotating_derivative(deflection, rotation, units[:, k]) for k in range(3)]
-    ways, pushed = sp.MatrixSymbol("E", n, 6), vector("push", n)
+    rows, force = sp.MatrixSymbol("E", n, 6), vector("push", n)
     steps = [
         Equation("deflection", vector("bent", n), deflection),
-        Equation("deflection by rates and rotations", ways, sp.Matrix.hstack(*derivatives, *turns)),
-        Equation("force along the deflection", pushed, push),
+        Equation("deflection by rates and rotations", rows, sp.Matrix.hstack(*derivatives, *turns)),
+        Equation("force along the deflection", force, push),
     ]
-    return steps, _explicit(ways).T * _explicit(pushed)
+    return steps, _explicit(rows).T * _explicit(force)
 
 
 def wrench_guards(element: ForceElement) -> tuple[tuple[sp.Basic, int, str], ...]:

@@ -82,7 +82,7 @@ def point() -> Derivation:
     )
 
 
-def turning() -> Derivation:
+def angular_motion() -> Derivation:
     """Angular velocity and acceleration of a body in inertial axes."""
     rate, second = symbol("w_K", 3), symbol("alpha_K", 3)
     delta = Quantity(symbol("delta", 6), "", "deviation of the body's acceleration")
@@ -116,7 +116,7 @@ def end_frame() -> Derivation:
     )
 
 
-def opposite() -> Derivation:
+def reaction_wrench() -> Derivation:
     """Load on the F end of a massless element with the load F and M on T."""
     x_f, x_t, force, moment = (symbol(n, 3) for n in ("x_F", "x_T", "F", "M"))
     back, turn = symbol("F_back", 3), symbol("M_back", 3)
@@ -285,7 +285,7 @@ def reaction() -> Derivation:
     )
 
 
-def moment_at() -> Derivation:
+def moment_about() -> Derivation:
     """Moment of a load about another point of the body, inertial axes."""
     f, moment = Quantity(symbol("f", 6), "N, N*m", "load at P, body axes"), symbol("moment", 3)
     return Derivation(
@@ -338,7 +338,7 @@ def rotor_energy() -> Derivation:
 def driven_effort() -> Derivation:
     """Effort on one speed beyond a given one: tau_d = load + J udot - tau."""
     load, inertia, rate, stated, effort = (
-        symbol(name, 1) for name in ("felt", "J", "udot", "tau", "tau_d")
+        symbol(name, 1) for name in ("load", "J", "udot", "tau", "tau_d")
     )
     return Derivation(
         "frames",
@@ -385,7 +385,7 @@ def length() -> Derivation:
     )
 
 
-def turned() -> Derivation:
+def to_inertial() -> Derivation:
     """Vector of a body in inertial axes."""
     local, out = symbol("b", 3), symbol("b_0", 3)
     return Derivation(

@@ -58,7 +58,7 @@ OUTBOARD_ROW = Quantity(symbol("J_B", 6), "", "row by the acceleration of B, at 
 BIAS = Quantity(symbol("l", 6), "", "known parts of the rows")
 
 
-def meet() -> Derivation:
+def relative_pose() -> Derivation:
     """Position of the end of B, from C and from A."""
     a_c, x_c = symbol("A_C", 3, 3), symbol("x_C", 3)
     a_b, x_b = symbol("A_B", 3, 3), symbol("x_B", 3)
@@ -153,7 +153,7 @@ def drift() -> Derivation:
     )
 
 
-def closing() -> Derivation:
+def required_acceleration() -> Derivation:
     """relative = rate gap: acceleration of the end of B that closes its gap within a step.
 
     1 / rate converts accelerations to changes of coordinates (M. Arnold, O. Brüls, Multibody
@@ -196,7 +196,7 @@ def row() -> Derivation:
     )
 
 
-def known() -> Derivation:
+def known_parts() -> Derivation:
     """Known parts of all six directions."""
     return Derivation(
         "loops",
@@ -220,7 +220,7 @@ def _carried_load(
     ]
 
 
-def told() -> Derivation:
+def row_acceleration() -> Derivation:
     """l + J_A delta_A + J_B delta_B: acceleration along a row in the computed motion."""
     of_a, of_b = (
         Quantity(symbol(f"delta_{name}", 6), "", f"deviation of the acceleration of {name}")
@@ -239,7 +239,7 @@ def told() -> Derivation:
     )
 
 
-def act() -> Derivation:
+def apply_effort() -> Derivation:
     """e -= J tau: load of an effort on a body."""
     direction = Quantity(symbol("J", 6), "", "load of a unit effort")
     effort = Quantity(symbol("tau", 1), "N, N*m", "effort")
@@ -267,7 +267,7 @@ def _accumulating(name: str, rows: int = 1, meaning: str = "") -> Quantity:
     return Quantity(symbol(name, rows), "", meaning, accumulate=True)
 
 
-def settle() -> Derivation:
+def pivot_inverse() -> Derivation:
     """1 / L_rr of the closing row r.
 
     A pivot below `floor` counts as rounding: the row has no free motion left, and its
@@ -283,7 +283,7 @@ def settle() -> Derivation:
     )  # fmt: skip
 
 
-def close() -> Derivation:
+def eliminate_row() -> Derivation:
     """Close row r on the body where its ends meet."""
     mass = Quantity(symbol("S", 6, 6), "", "S of the body", symmetric=True, accumulate=True)
     load = _accumulating("e", 6, "e of the body")
@@ -308,7 +308,7 @@ def _scale_vector(factor: sp.Expr, vector: sp.MatrixSymbol) -> sp.ImmutableDense
     return sp.ImmutableDenseMatrix([factor * vector[i, 0] for i in range(int(vector.rows))])
 
 
-def shed() -> Derivation:
+def update_column() -> Derivation:
     """Column of an open row p after row r is closed."""
     column_p = _accumulating("K_p", 6, "column of row p")
     share = -INVERSE.symbol[0, 0] * COUPLING.symbol[0, 0]
@@ -320,7 +320,7 @@ def shed() -> Derivation:
     )  # fmt: skip
 
 
-def shed_known() -> Derivation:
+def update_known_part() -> Derivation:
     """Known part of an open row p after row r is closed."""
     known_p = _accumulating("l_p", 1, "known part of row p")
     value = -INVERSE.symbol[0, 0] * COUPLING.symbol[0, 0] * KNOWN_PART.symbol[0, 0]
@@ -332,7 +332,7 @@ def shed_known() -> Derivation:
     )  # fmt: skip
 
 
-def shed_pair() -> Derivation:
+def update_coupling() -> Derivation:
     """Entry of L of two open rows after row r is closed."""
     second = Quantity(symbol("L_q", 1), "", "entry of L of the eliminated row and the second")
     entry = _accumulating("L_pq", 1, "entry of L of both")
@@ -353,7 +353,7 @@ def multiplier() -> Derivation:
     )  # fmt: skip
 
 
-def multiplier_more() -> Derivation:
+def multiplier_of_motion() -> Derivation:
     """Contribution of the body where the row closes."""
     delta = Quantity(symbol("delta", 6), "", "deviation of the acceleration of the body")
     result = _accumulating("x", 1, "multiplier of row r")
@@ -367,7 +367,7 @@ def multiplier_more() -> Derivation:
     )  # fmt: skip
 
 
-def multiplier_less() -> Derivation:
+def multiplier_of_row() -> Derivation:
     """Contribution of a row p that was open then."""
     multiplier_p = Quantity(symbol("x_p", 1), "N, N*m", "multiplier of row p")
     result = _accumulating("x", 1, "multiplier of row r")
@@ -380,7 +380,7 @@ def multiplier_less() -> Derivation:
     )  # fmt: skip
 
 
-def yielded() -> Derivation:
+def rotor_row_residual() -> Derivation:
     """l += s - x / J: residual of a rotor's row s = x / J at known s and x."""
     soft = Quantity(symbol("softness", 1), "", "1 / J of the rotor on the row")
     acceleration = Quantity(symbol("s", 1), "", "acceleration of its speed")
@@ -393,7 +393,7 @@ def yielded() -> Derivation:
     )  # fmt: skip
 
 
-def loaded() -> Derivation:
+def apply_multiplier() -> Derivation:
     """e += K x: load of known multipliers."""
     load = _accumulating("e", 6, "e of the body")
     return Derivation(
@@ -441,7 +441,7 @@ def couple(nu: int) -> Derivation:
     )  # fmt: skip
 
 
-def answered(nu: int) -> Derivation:
+def add_known_part(nu: int) -> Derivation:
     """l_j -= z_j . (tau - H^T e)."""
     y, z = _speed_quantity("y", nu, "tau - H^T e"), _speed_quantity("z", nu, "of the row")
     known = _accumulating("l", 1, "known part of the row")
@@ -451,7 +451,7 @@ def answered(nu: int) -> Derivation:
     )  # fmt: skip
 
 
-def pull(nu: int) -> Derivation:
+def add_multiplier_effort(nu: int) -> Derivation:
     """tau - H^T e with the multiplier of a row: udot = D^-1 (y_0 + sum y_j x_j) - G a."""
     y = _speed_quantity("y", nu, "of the row")
     total = _accumulating("y_0", nu, "tau - H^T e")
@@ -467,25 +467,9 @@ def pull(nu: int) -> Derivation:
 
 #: Steps that do not depend on the number of hinge speeds.
 STEPS = (
-    meet,
-    gap,
-    slip,
-    drift,
-    closing,
-    row,
-    known,
-    told,
-    act,
-    settle,
-    close,
-    shed,
-    shed_known,
-    shed_pair,
-    multiplier,
-    multiplier_more,
-    multiplier_less,
-    yielded,
-    loaded,
-)
+    relative_pose, gap, slip, drift, required_acceleration, row, known_parts, row_acceleration,
+    apply_effort, pivot_inverse, eliminate_row, update_column, update_known_part, update_coupling,
+    multiplier, multiplier_of_motion, multiplier_of_row, rotor_row_residual, apply_multiplier,
+)  # fmt: skip
 #: Steps for hinges with at least one speed.
-OF_SPEEDS = (divide, couple, answered, pull)
+OF_SPEEDS = (divide, couple, add_known_part, add_multiplier_effort)

@@ -87,7 +87,7 @@ def factor() -> Derivation:
     for i in range(6):
         remainder = S.symbol[i, i] - sum(row[i] ** 2 for row in entries)
         least = _ROUNDING * S.symbol[i, i]
-        root, rooted = _scalar_equation(
+        root, root_equation = _scalar_equation(
             f"root_{i + 1}", sp.sqrt(sp.Max(remainder, least)), f"U_{i + 1}{i + 1}"
         )
         share, shared = _scalar_equation(
@@ -100,7 +100,7 @@ def factor() -> Derivation:
         row = symbol(f"row_{i + 1}", 1, 6)
         values = [*[sp.Integer(0)] * i, root, *later]
         equations += [
-            rooted, shared, Equation(f"row {i + 1}", row, sp.ImmutableDenseMatrix([values]))
+            root_equation, shared, Equation(f"row {i + 1}", row, sp.ImmutableDenseMatrix([values]))
         ]  # fmt: skip
         entries.append([row[0, j] for j in range(6)])
     matrix = sp.ImmutableDenseMatrix(entries)
@@ -145,7 +145,7 @@ def _split_load() -> tuple[tuple[Equation, ...], sp.MatrixSymbol, sp.MatrixSymbo
     """d + U^-T e, row by row, and the remainder of e where rows are too small to carry it."""
     u, equations = triangular(ROWS.symbol), []
     carried: list[sp.Expr] = []
-    uncarried: list[sp.Expr] = []
+    remaining_load: list[sp.Expr] = []
     for i in range(6):
         remainder_i, equation = _scalar_equation(
             f"left_{i + 1}", E.symbol[i, 0] - sum(u[k, i] * carried[k] for k in range(i)),
@@ -165,12 +165,12 @@ def _split_load() -> tuple[tuple[Equation, ...], sp.MatrixSymbol, sp.MatrixSymbo
         )
         equations += [equation, adding, carried_equation]
         carried.append(added)
-        uncarried.append(carried_i)
+        remaining_load.append(carried_i)
     whole, remaining = symbol("d_all", 6), symbol("e_rest", 6)
     total = [ROW_LOAD.symbol[i, 0] + carried[i] for i in range(6)]
     equations += [
         Equation("d + U^-T e", whole, sp.ImmutableDenseMatrix(total)),
-        Equation("remainder of e", remaining, sp.ImmutableDenseMatrix(uncarried)),
+        Equation("remainder of e", remaining, sp.ImmutableDenseMatrix(remaining_load)),
     ]
     return tuple(equations), whole, remaining
 
@@ -185,18 +185,22 @@ def qr_eliminate(nu: int) -> Derivation:
     rotor = Quantity(symbol("J", nu), "kg*m2 or kg", "rotor inertia reflected to the speeds")
     tau = Quantity(symbol("tau", nu), "N, N*m", "efforts on the free coordinates")
     gain, offset = gains(nu)
-    equations, load, uncarried = _split_load()
+    equations, load, remaining_load = _split_load()
     rows, pivots = _rotated_rows(nu), _pivots(nu)
-    u, pushed, surplus = triangular(ROWS.symbol), symbol("UH", 6, nu), symbol("surplus", nu)
+    u, subspace_rows, surplus = triangular(ROWS.symbol), symbol("UH", 6, nu), symbol("surplus", nu)
     stacked: sp.Basic = sp.BlockMatrix([[u, load]])
     if nu:
         rotors = sp.ImmutableDenseMatrix(sp.diag(*[sp.sqrt(x) for x in column(rotor.symbol)]))
-        stacked = sp.BlockMatrix([[pushed, u, load], [rotors, sp.zeros(nu, 6), sp.zeros(nu, 1)]])
-        squares = [sum(pushed[i, k] ** 2 for i in range(6)) + rotor.symbol[k, 0] for k in range(nu)]
+        stacked = sp.BlockMatrix(
+            [[subspace_rows, u, load], [rotors, sp.zeros(nu, 6), sp.zeros(nu, 1)]]
+        )
+        squares = [
+            sum(subspace_rows[i, k] ** 2 for i in range(6)) + rotor.symbol[k, 0] for k in range(nu)
+        ]
         equations += (
-            Equation("U H", pushed, u * h.symbol),
+            Equation("U H", subspace_rows, u * h.symbol),
             Equation("diagonal of D", pivots, sp.ImmutableDenseMatrix(squares)),
-            Equation("tau - H^T e", surplus, tau.symbol - h.symbol.T * uncarried),
+            Equation("tau - H^T e", surplus, tau.symbol - h.symbol.T * remaining_load),
         )
     equations += (Equation("rotated rows", rows, Triangle(stacked, nu + 6)),)
     if nu:
@@ -205,11 +209,11 @@ def qr_eliminate(nu: int) -> Derivation:
             Equation(
                 "e_Q = e + G^T (tau - H^T e)",
                 REMAINING_LOAD.symbol,
-                uncarried + gain.symbol.T * surplus,
+                remaining_load + gain.symbol.T * surplus,
             ),
         )
     else:
-        equations += (Equation("e_Q = e", REMAINING_LOAD.symbol, uncarried),)
+        equations += (Equation("e_Q = e", REMAINING_LOAD.symbol, remaining_load),)
     outboard_rows = sp.ImmutableDenseMatrix(6, 6, lambda i, j: rows[nu + i, nu + j])
     onward = sp.ImmutableDenseMatrix([rows[nu + i, nu + 6] for i in range(6)])
     equations += (
@@ -246,7 +250,7 @@ def _gain_equations(
     shares, lower = symbol("shares", nu), symbol("L", nu, nu)
     below, scaled_right = symbol("y", nu), symbol("w", nu)
     scaled = sp.ImmutableDenseMatrix(nu, 6, lambda k, j: shares[k, 0] * rows[k, nu + j])
-    pulled = [shares[k, 0] * (shares[k, 0] * below[k, 0] - rows[k, nu + 6]) for k in range(nu)]
+    efforts = [shares[k, 0] * (shares[k, 0] * below[k, 0] - rows[k, nu + 6]) for k in range(nu)]
     return (
         Equation("1 / R_ii", shares, sp.ImmutableDenseMatrix([1 / rows[k, k] for k in range(nu)])),
         Equation(
@@ -258,7 +262,7 @@ def _gain_equations(
         Equation("G = R_u^-1 R_a", gain.symbol, Triangular(lower, scaled, transposed=True)),
         Equation("L^-1 (tau - H^T e)", below, Triangular(lower, surplus)),
         Equation(
-            "R_ii^-1 (R_u^-T (tau - H^T e) - d_u)", scaled_right, sp.ImmutableDenseMatrix(pulled)
+            "R_ii^-1 (R_u^-T (tau - H^T e) - d_u)", scaled_right, sp.ImmutableDenseMatrix(efforts)
         ),
         Equation("g", offset.symbol, Triangular(lower, scaled_right, transposed=True)),
     )  # fmt: skip
@@ -286,7 +290,7 @@ def merge() -> Derivation:
     both into one triangle.
     """
     v, parent_rows = triangular(CARRIED_ROWS.symbol), triangular(PARENT_ROWS.symbol)
-    turned, linear_part = symbol("V_a", 6, 3), symbol("V_r", 6, 3)
+    linear_part, angular_part = symbol("V_a", 6, 3), symbol("V_r", 6, 3)
     back = R.symbol.T
     linear = sp.ImmutableDenseMatrix(6, 3, lambda i, j: v[i, j])
     angular = sp.ImmutableDenseMatrix(6, 3, lambda i, j: v[i, 3 + j])
@@ -298,11 +302,11 @@ def merge() -> Derivation:
         (R, SHIFT, CARRIED_ROWS, CARRIED_ROW_LOAD, REMAINING_LOAD, PARENT_ROWS, PARENT_ROW_LOAD),
         (ROWS, ROW_LOAD, PARENT_E),
         (
-            Equation("V by accelerations at the parent", turned, linear * back),
+            Equation("V by accelerations at the parent", linear_part, linear * back),
             Equation(
                 "V by its angular accelerations",
-                linear_part,
-                angular * back - turned * tilde(column(SHIFT.symbol)),
+                angular_part,
+                angular * back - linear_part * tilde(column(SHIFT.symbol)),
             ),
             Equation(
                 "rotated rows",
@@ -310,7 +314,7 @@ def merge() -> Derivation:
                 Triangle(
                     sp.BlockMatrix(
                         [[parent_rows, PARENT_ROW_LOAD.symbol],
-                         [sp.BlockMatrix([[turned, linear_part]]), CARRIED_ROW_LOAD.symbol]]
+                         [sp.BlockMatrix([[linear_part, angular_part]]), CARRIED_ROW_LOAD.symbol]]
                     ),
                     6,
                 ),
@@ -323,7 +327,7 @@ def merge() -> Derivation:
     )  # fmt: skip
 
 
-def restored() -> Derivation:
+def rows_to_riccati() -> Derivation:
     """S and e of the rows and loads, for readers of the load at P."""
     u = triangular(ROWS.symbol)
     e = Quantity(symbol("e_S", 6), "N, N*m", "force part of f = S a + e")

@@ -230,7 +230,7 @@ def condense(
             inertia = inertia + sp.ImmutableDenseMatrix(sp.diag(*column(rotor.symbol)))
         units = unit_directions(subspace) if specialised else {}
         zeros = tuple((i, j) for i in range(6) for j in range(6) if i in units or j in units)
-        passed = E.symbol + push * offset.symbol
+        inboard_load = E.symbol + push * offset.symbol
         equations = [
             Equation("U = S H", push, S.symbol * h),
             Equation("D = H^T U + J", pivot, inertia),
@@ -243,7 +243,7 @@ def condense(
             Equation(
                 "S_Q = S - U G", reduced, S.symbol - push * gain.symbol, zeros=zeros, symmetric=True
             ),
-            Equation("e_Q = e + U g", symbol("e_full", 6), passed),
+            Equation("e_Q = e + U g", symbol("e_full", 6), inboard_load),
             Equation("e_Q", load, replace_rows(symbol("e_full", 6), tau.symbol, units)),
         ]
     else:

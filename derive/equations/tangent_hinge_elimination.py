@@ -35,7 +35,7 @@ _COLUMN = (
 )
 
 
-def tangent_turned() -> Derivation:
+def tangent_pose_change() -> Derivation:
     """theta and R^T dd, theta~ = R^T dR."""
     r, d_r, d_d = symbol("R", 3, 3), symbol("d_R", 3, 3), symbol("d_d", 3)
     turn = sp.ImmutableDenseMatrix(
@@ -54,7 +54,7 @@ def tangent_turned() -> Derivation:
     )
 
 
-def tangent_along(nu: int) -> Derivation:
+def tangent_coordinate_change(nu: int) -> Derivation:
     """theta = H_w dq and R^T dd = H_v dq, for coordinate rates equal to the speeds."""
     h, d_q = symbol("H", 6, nu), symbol("d_q", nu)
     return Derivation(
@@ -228,7 +228,7 @@ def tangent_steady(nu: int) -> Derivation:
     )  # fmt: skip
 
 
-def tangent_turning(nu: int) -> Derivation:
+def tangent_rotational(nu: int) -> Derivation:
     """`tangent_steady` of a hinge that only rotates: v, H_v and displacement are zero."""
     h, w, d_u, d_s = symbol("H", 6, nu), symbol("w", 3), symbol("d_u", nu), symbol("d_s", nu)
     d_w, own_acceleration = symbol("d_w", 3), symbol("own", 3)
@@ -321,7 +321,7 @@ def tangent_reduce(nu: int) -> Derivation:
     )
 
 
-def tangent_push(nu: int, known: bool = False) -> Derivation:
+def tangent_load(nu: int, known: bool = False) -> Derivation:
     """y = D^-1 (-e_f - H^T e), and the load e + V y carried to the parent.
 
     With `known`, the load of known increments is added.
@@ -350,12 +350,12 @@ def tangent_push(nu: int, known: bool = False) -> Derivation:
     )
 
 
-def tangent_push_known(nu: int) -> Derivation:
-    """`tangent_push` with known increments of the hinge."""
-    return tangent_push(nu, known=True)
+def tangent_load_with_increments(nu: int) -> Derivation:
+    """`tangent_load` with known increments of the hinge."""
+    return tangent_load(nu, known=True)
 
 
-def tangent_answer(nu: int, known: bool = False) -> Derivation:
+def tangent_solution(nu: int, known: bool = False) -> Derivation:
     """x = y - D^-1 H^T S z of a hinge, z = Th z_I, and the motion z + B x of the body.
 
     With `known`, the known motion is added to z.
@@ -392,6 +392,6 @@ def tangent_answer(nu: int, known: bool = False) -> Derivation:
     )
 
 
-def tangent_answer_known(nu: int) -> Derivation:
-    """`tangent_answer` with known increments of the hinge."""
-    return tangent_answer(nu, known=True)
+def tangent_solution_with_increments(nu: int) -> Derivation:
+    """`tangent_solution` with known increments of the hinge."""
+    return tangent_solution(nu, known=True)

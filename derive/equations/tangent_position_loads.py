@@ -51,7 +51,7 @@ def _carried_displacement() -> sp.BlockMatrix:
     )
 
 
-def placed_moved() -> Derivation:
+def placed_displacement() -> Derivation:
     """p of the outboard body from the motion of the parent."""
     return Derivation(
         "frames",
@@ -108,17 +108,19 @@ def placed_carry() -> Derivation:
     """S_p Th_p and S_p Th_z, and both carried by X^T to the parent."""
     s_th = Quantity(symbol("T_p", 9, 6), "", "S_p Th_p, one row per entry")
     by_spin = Quantity(symbol("T_w", 3, 6), "", "S_p Th_z by angular velocity", accumulate=True)
-    to_place = Quantity(symbol("S_pI", 9, 6), "", "that of the parent", accumulate=True)
-    to_spin = Quantity(symbol("S_wI", 3, 6), "", "the parent's S, of it that", accumulate=True)
+    to_place = Quantity(symbol("S_pI", 9, 6), "", "S_p of the parent", accumulate=True)
+    to_spin = Quantity(
+        symbol("S_wI", 3, 6), "", "S of the parent, by angular velocity", accumulate=True
+    )
     s = _ROWS_S.symbol.T
     turn, position, velocity = (s[:, 3 * k : 3 * k + 3] for k in range(3))
     t_turn, t_place, t_velocity, t_spin = (
         symbol(f"T_{name}", 6, 3) for name in ("psi", "r", "v", "dw")
     )
     lever = tilde(column(SHIFT.symbol))
-    total, pushed = symbol("T_all", 6, 12), symbol("push", 3, 12)
+    total, parent_force = symbol("T_all", 6, 12), symbol("push", 3, 12)
     carried = symbol("carried", 6, 12)
-    moment = R.symbol * total[3:, :] + lever * pushed
+    moment = R.symbol * total[3:, :] + lever * parent_force
     return Derivation(
         "frames",
         "change of a load by the pose, carried to the parent",
@@ -134,8 +136,8 @@ def placed_carry() -> Derivation:
             ),
             Equation("S_p Th_p, by rows", s_th.symbol, total[:, :9].T),
             Equation("S_p Th_z, by rows", by_spin.symbol, total[:, 9:].T),
-            Equation("forces, parent axes", pushed, R.symbol * total[:3, :]),
-            Equation("X^T S_p [Th_p, Th_z]", carried, sp.BlockMatrix([[pushed], [moment]])),
+            Equation("forces, parent axes", parent_force, R.symbol * total[:3, :]),
+            Equation("X^T S_p [Th_p, Th_z]", carried, sp.BlockMatrix([[parent_force], [moment]])),
             Equation("X^T S_p Th_p", to_place.symbol, carried[:, :9].T),
             Equation("X^T S_p Th_z", to_spin.symbol, carried[:, 9:].T),
         ),
@@ -143,13 +145,15 @@ def placed_carry() -> Derivation:
     )
 
 
-def placed_known() -> Derivation:
-    """Contribution of a known displacement to `tangent_known`."""
+def placed_known_load() -> Derivation:
+    """Contribution of a known displacement to `tangent_known_load`."""
     displacement = Quantity(symbol("b_p", 9), "", "known change of pose")
     load_rows = Quantity(
         symbol("e_S", 6), "N, N*m", "load due to known increments", accumulate=True
     )
-    carried = Quantity(symbol("e_b", 6), "N, N*m", "the same, as it is carried", accumulate=True)
+    carried = Quantity(
+        symbol("e_b", 6), "N, N*m", "carried load due to known increments", accumulate=True
+    )
     load = symbol("e_p", 6)
     return Derivation(
         "frames",
@@ -236,16 +240,16 @@ def placed_node() -> Derivation:
     )
 
 
-def placed_absorb() -> Derivation:
-    """Complement of `absorb`: position-dependent loads outboard of a port of a flexible body."""
+def placed_port() -> Derivation:
+    """`assemble_port` for position-dependent loads outboard of a port of a flexible body."""
     s_th = Quantity(symbol("T_p", 9, 6), "", "S_p Th_p, one row per entry")
     load = Quantity(OWN_K.symbol, accumulate=True)
     rows = Quantity(_OWN_ROWS.symbol, accumulate=True)
     by_unknowns = Quantity(OWN_D.symbol, accumulate=True)
     k = sp.MatrixSymbol("K_x", 6, N)
-    pushed = sp.MatrixSymbol("force", 3, N)
+    parent_force = sp.MatrixSymbol("force", 3, N)
     lever = tilde(column(SHIFT.symbol))
-    parent_load = sp.BlockMatrix([[pushed.T, (R.symbol * k[3:, :] + lever * pushed).T]])
+    parent_load = sp.BlockMatrix([[parent_force.T, (R.symbol * k[3:, :] + lever * parent_force).T]])
     return Derivation(
         "tangent",
         "loads by the pose of the part outboard of a port, along the unknowns of its body",
@@ -253,7 +257,7 @@ def placed_absorb() -> Derivation:
         (load, rows, by_unknowns),
         (
             Equation("S_p B_p", k, _ROWS_S.symbol.T * _B.symbol.T),
-            Equation("force of S_p B_p", pushed, R.symbol * k[:3, :]),
+            Equation("force of S_p B_p", parent_force, R.symbol * k[:3, :]),
             Equation("X^T S_p B_p", load.symbol, parent_load),
             Equation("H^T S_p Th_p", rows.symbol, s_th.symbol * H.symbol),
             Equation("H^T S_p B_p", by_unknowns.symbol, k.T * H.symbol),
@@ -262,7 +266,7 @@ def placed_absorb() -> Derivation:
     )
 
 
-def placed_left() -> Derivation:
+def placed_remainder() -> Derivation:
     """y less the contribution of the displacement to the rows."""
     result = Quantity(SOLUTION.symbol, "", "the remainder of the rows", accumulate=True)
     return Derivation(

@@ -64,14 +64,14 @@ def _spin_acceleration() -> sp.ImmutableDenseMatrix:
 def tangent_carry() -> Derivation:
     """S Th, and X^T S Th added to the parent's S."""
     s_th = Quantity(symbol("T", 9, 6), "", "S Th, one row per entry")
-    parent = Quantity(symbol("S_I", 9, 6), "", "that of the parent", accumulate=True)
+    parent = Quantity(symbol("S_I", 9, 6), "", "S of the parent", accumulate=True)
     s = ROWS_S.symbol.T
     turn, rate, linear = (s[:, 3 * k : 3 * k + 3] for k in range(3))
     t_turn, t_rate, t_linear = (symbol(f"T_{name}", 6, 3) for name in ("w", "wd", "a"))
     velocity, t_rotation = symbol("v_I", 3), symbol("T_turn", 3, 3)
     relative, lever = tilde(column(W_REL.symbol)), tilde(column(SHIFT.symbol))
-    total, pushed = symbol("T_all", 6, 9), symbol("push", 3, 9)
-    moment = R.symbol * total[3:, :] + lever * pushed
+    total, parent_force = symbol("T_all", 6, 9), symbol("push", 3, 9)
+    moment = R.symbol * total[3:, :] + lever * parent_force
     return Derivation(
         "frames",
         "change of a load carried to the parent",
@@ -93,8 +93,8 @@ def tangent_carry() -> Derivation:
             ),
             Equation("S Th", total, sp.BlockMatrix([[t_turn, t_rate, t_linear]])),
             Equation("S Th, by rows", s_th.symbol, total.T),
-            Equation("forces, parent axes", pushed, R.symbol * total[:3, :]),
-            Equation("X^T S Th", parent.symbol, sp.BlockMatrix([[pushed.T, moment.T]])),
+            Equation("forces, parent axes", parent_force, R.symbol * total[:3, :]),
+            Equation("X^T S Th", parent.symbol, sp.BlockMatrix([[parent_force.T, moment.T]])),
         ),
         sources=SOURCES,
     )
@@ -112,12 +112,12 @@ def outboard_motion() -> tuple[Equation, sp.BlockMatrix]:
     )
 
 
-def tangent_moved() -> Derivation:
+def tangent_motion() -> Derivation:
     """Th z_I: change of the body's motion by that of its parent."""
     first, motion = outboard_motion()
     return Derivation(
         "frames",
-        "change of a body's motion by that of its parent's",
+        "change of a body's motion by that of its parent",
         (R, SHIFT, PARENT_RATE, V_REL, W_REL, Z_PARENT),
         (Z,),
         (first, Equation("Th z_I", Z.symbol, motion)),
@@ -136,11 +136,11 @@ _ROTATED_LOAD = Quantity(
 )
 
 
-def tangent_known() -> Derivation:
+def tangent_known_load() -> Derivation:
     """S b, as it enters the rows of unknowns, and S b + g, as it is carried on.
 
     With S after elimination of the unknowns, the rows of the unknowns only need z + b in place
-    of z (see `tangent_answer`).
+    of z (see `tangent_solution`).
     """
     load_rows = Quantity(symbol("e_S", 6), "N, N*m", "load due to the known motion")
     return Derivation(
@@ -222,7 +222,7 @@ def node() -> Derivation:
     )
 
 
-def absorb() -> Derivation:
+def assemble_port() -> Derivation:
     """Contribution of the bodies outboard of a port to the unknowns of a flexible body."""
     s_th = Quantity(symbol("T", 9, 6), "", "S Th, one row per entry")
     load = Quantity(OWN_K.symbol, accumulate=True)
@@ -230,9 +230,9 @@ def absorb() -> Derivation:
     by_unknowns = Quantity(OWN_D.symbol, accumulate=True)
     k = Quantity(sp.MatrixSymbol("K_x", 6, N), "", "S B")
     force, moment = symbol("force", 3, N), symbol("moment", 3, N)
-    pushed = R.symbol * force
+    parent_force = R.symbol * force
     lever = tilde(column(SHIFT.symbol))
-    parent_load = sp.BlockMatrix([[pushed.T, (R.symbol * moment + lever * pushed).T]])
+    parent_load = sp.BlockMatrix([[parent_force.T, (R.symbol * moment + lever * parent_force).T]])
     return Derivation(
         "tangent",
         "part outboard of a port, along the unknowns of its body",
@@ -250,7 +250,7 @@ def absorb() -> Derivation:
     )
 
 
-def push() -> Derivation:
+def column_load() -> Derivation:
     """One right-hand side: y = D^-1 (-e_f - H^T e), and the load e + V y."""
     load_rows = Quantity(sp.MatrixSymbol("e_f", N, 1), "", "load of the rows")
     right_side = Quantity(sp.MatrixSymbol("rest", N, 1), "", "the remainder of the rows")
@@ -269,7 +269,7 @@ def push() -> Derivation:
     )
 
 
-def lagged() -> Derivation:
+def coordinate_increment() -> Derivation:
     """dq = Q times the change of the rates."""
     inverse = _square("Q", "(sq 1 - kappa g_q)^-1")
     rate = Quantity(sp.MatrixSymbol("rate", N, 1), "", "change of the rates at given coordinates")
@@ -287,7 +287,7 @@ UNKNOWNS = Quantity(sp.MatrixSymbol("x", N, 1), "", "unknowns")
 BASE_MOTION = Quantity(vector("z_c", 9), "", "change of motion without the unknowns' part")
 
 
-def answer() -> Derivation:
+def column_solution() -> Derivation:
     """x = y - D^-1 H^T S z, and the motion including that of the unknowns."""
     return Derivation(
         "tangent",
@@ -302,7 +302,7 @@ def answer() -> Derivation:
     )
 
 
-def displaced() -> Derivation:
+def port_motion() -> Derivation:
     """Motion of a port that follows the unknowns of a flexible body."""
     return Derivation(
         "tangent",
@@ -314,7 +314,7 @@ def displaced() -> Derivation:
     )
 
 
-def lag() -> Derivation:
+def increment_matrix() -> Derivation:
     """Q = (sq 1 - kappa g_q)^-1 of a hinge whose rates depend on its coordinates."""
     slopes = _square("g_q", "derivatives of the rates by the coordinates, one row per direction")
     unit = _square("one", "unit matrix")

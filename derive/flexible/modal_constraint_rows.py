@@ -26,7 +26,7 @@ def _accumulating(quantity: Quantity) -> Quantity:
     return Quantity(quantity.symbol, quantity.unit, quantity.meaning, accumulate=True)
 
 
-def row_felt() -> Derivation:
+def modal_column() -> Derivation:
     """Modal column of a row at a section."""
     return Derivation(
         "modal",
@@ -38,7 +38,7 @@ def row_felt() -> Derivation:
     )
 
 
-def row_condensed() -> Derivation:
+def condense_row() -> Derivation:
     """A row after elimination of the modes."""
     known_part = Quantity(symbol("l", 1), "", "known part of the row", accumulate=True)
     gain = MODAL_GAIN.symbol
@@ -58,7 +58,7 @@ def row_condensed() -> Derivation:
     )
 
 
-def row_coupled() -> Derivation:
+def row_coupling() -> Derivation:
     """Contribution of the modes of one body to the entry of L of two rows."""
     entry = Quantity(symbol("L_ij", 1), "", "entry of L", accumulate=True)
     return Derivation(
@@ -75,7 +75,7 @@ def row_coupled() -> Derivation:
     )
 
 
-def row_answered() -> Derivation:
+def multiplier_acceleration() -> Derivation:
     """Modal accelerations due to the multiplier of a row."""
     multiplier = Quantity(symbol("x", 1), "", "multiplier of the row")
     return Derivation(
@@ -88,4 +88,4 @@ def row_answered() -> Derivation:
     )
 
 
-STEPS = (row_felt, row_condensed, row_coupled, row_answered)
+STEPS = (modal_column, condense_row, row_coupling, multiplier_acceleration)

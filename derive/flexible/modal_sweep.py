@@ -40,7 +40,7 @@ def _accumulating(quantity: Quantity) -> Quantity:
     return Quantity(quantity.symbol, quantity.unit, quantity.meaning, accumulate=True)
 
 
-def absorb() -> Derivation:
+def assemble_port() -> Derivation:
     """Modal rows of the bodies outboard of a port; its frame rows are carried as by a weld."""
     force, moment = WORK.symbol[:3, :], WORK.symbol[3:, :]
     lever = tilde(row_entries(SHIFT.symbol, 0))
@@ -131,7 +131,7 @@ def recover() -> Derivation:
     )
 
 
-def displaced() -> Derivation:
+def port_deviation() -> Derivation:
     """Deviation of a port that follows the modes: a + H etadd."""
     return Derivation(
         "modal",
@@ -149,7 +149,7 @@ def displaced() -> Derivation:
     )
 
 
-def prescribed() -> Derivation:
+def prescribed_load() -> Derivation:
     """Loads of prescribed modal accelerations s."""
     s = modal_vector("s", "prescribed modal accelerations")
     accumulated_load = Quantity(E.symbol, E.unit, E.meaning, accumulate=True)
@@ -182,7 +182,7 @@ def modal_effort() -> Derivation:
     )
 
 
-def pushed() -> Derivation:
+def column_load() -> Derivation:
     """Load e - G^T e_f of a flexible body after elimination of its modes, with S condensed."""
     load = Quantity(vector("e_c", 6), "N, N*m", "e without modes")
     gain = MODAL_GAIN.symbol[:, :6]
@@ -196,7 +196,7 @@ def pushed() -> Derivation:
     )
 
 
-def answer() -> Derivation:
+def column_acceleration() -> Derivation:
     """Modal accelerations due to a load on the modes and the deviation of the frame."""
     response = modal_vector("y", "S_ff^-1 e_f")
     gain = MODAL_GAIN.symbol[:, :6]
@@ -217,7 +217,7 @@ def answer() -> Derivation:
     )
 
 
-def stiffened() -> Derivation:
+def step_stiffness() -> Derivation:
     """Modal rows if coordinates and rates change in proportion to the accelerations."""
     rate = Quantity(vector("rate", 1), "s", "change of the rates by the accelerations")
     inverse = Quantity(vector("sq", 1), "1/s2", "accelerations by the change of the coordinates")
@@ -237,7 +237,7 @@ def stiffened() -> Derivation:
     )
 
 
-def strained() -> Derivation:
+def strain_load() -> Derivation:
     """Required modal load for changes of the modal coordinates and rates."""
     return Derivation(
         "modal",
@@ -256,15 +256,6 @@ def strained() -> Derivation:
 
 
 STEPS = (
-    absorb,
-    rebase,
-    condense,
-    recover,
-    displaced,
-    prescribed,
-    modal_effort,
-    pushed,
-    answer,
-    stiffened,
-    strained,
-)
+    assemble_port, rebase, condense, recover, port_deviation, prescribed_load, modal_effort,
+    column_load, column_acceleration, step_stiffness, strain_load,
+)  # fmt: skip

@@ -195,7 +195,7 @@ def _velocity_equations(subspace: sp.Basic) -> tuple[Equation, ...]:
     )
 
 
-def outward() -> Derivation:
+def end_motion() -> Derivation:
     """Motion from the floating frame (inboard) to an end (outboard), as a hinge kernel."""
     rotation, end_rotation = _OUTPUTS[0].symbol, END_ROTATION.symbol
     zero_block = sp.zeros(3, 3)
@@ -217,10 +217,10 @@ def outward() -> Derivation:
     )
 
 
-def inward() -> Derivation:
+def frame_motion() -> Derivation:
     """Motion from the supported end (inboard) to the floating frame (outboard).
 
-    The inverse of `outward`: w = -W with W = T(-Psi) Psid the spin of the section in frame
+    The inverse of `end_motion`: w = -W with W = T(-Psi) Psid the spin of the section in frame
     axes, v = W x x - xd.
     """
     rotation, end_rotation = _OUTPUTS[0].symbol, END_ROTATION.symbol

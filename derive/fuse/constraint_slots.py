@@ -49,7 +49,7 @@ _INACTIVE_PIVOT = 1e300
 class RowSlots(Slots):
     """Slots including those of constraint rows.
 
-    `level` is the corrected quantity of closed loops: "gaping", "slipping" or "" (none).
+    `level` is the corrected quantity of loops: "position_gap", "velocity_error" or "" (none).
     """
 
     level = ""
@@ -69,7 +69,7 @@ class RowSlots(Slots):
 
     def is_inactive(self) -> bool:
         """Whether the current row is inactive: no condition on it, or a zero pivot."""
-        if self.level == "gaping" and self.row().of_speeds:
+        if self.level == "position_gap" and self.row().of_speeds:
             return True
         return self.get("row.pivot", 1)[0].value == 0
 
@@ -181,7 +181,8 @@ def row_subject(rows: tuple[RowStructure, ...], index: int) -> Subject:
 
 def coupling_inputs(slots: RowSlots) -> Iterator[tuple[CouplingStructure, Node]]:
     """Yield couplings with their errors at the current level; fill the slots that rows read."""
-    state, level = slots.state, {"gaping": "gap", "slipping": "slip"}.get(slots.level, "drift")
+    state = slots.state
+    level = {"position_gap": "gap", "velocity_error": "slip"}.get(slots.level, "drift")
     if state.structure.coupled is None:
         return
     numbers = state.expression(state.structure.coupled)
@@ -200,5 +201,5 @@ def coupling_inputs(slots: RowSlots) -> Iterator[tuple[CouplingStructure, Node]]
                 nu = state.structure.bodies[body].nu
                 slots.fill("pending.tau", numbers[at : at + nu])
             slots.fill("row.known", [error])
-            slots.fill("coupling.still", [values["still"]])
+            slots.fill("coupling.time_rate", [values["time_rate"]])
         yield coupling, error

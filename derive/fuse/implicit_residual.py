@@ -14,7 +14,7 @@ from mstmm.ir.inline import Nodes
 from mstmm.ir.scene_structure import Structure
 from mstmm.ir.unrolled_solve import factor_reverse_lu, solve_pivoted, solve_reverse_lu
 
-from ..schedule.forward_kinematics import FORWARD, PRESCRIBED
+from ..schedule.forward_kinematics import FORWARD, PRESCRIBED_ACCELERATIONS
 from ..schedule.pass_steps import Run, Sweep
 from ..schedule.sweeps import INVERSE_DYNAMICS
 from .fusion_state import FusionState, Kernels
@@ -28,7 +28,7 @@ Matrix = list[Nodes]
 #: speeds, with four times the compile time.
 _MAX_SPEEDS_STORED = 8
 #: Prescribed motion is not applied: coordinates are used as given.
-RATES = Sweep("rates", "Rates of the coordinates.", (Run(whole=PRESCRIBED), Run(whole=FORWARD)))
+RATES = Sweep("rates", "Rates of q.", (Run(whole=PRESCRIBED_ACCELERATIONS), Run(whole=FORWARD)))
 
 
 def fuse_implicit(structure: Structure, kernels: Kernels) -> FusedSceneIR:
@@ -90,7 +90,7 @@ def _solution_kernel(nu: int) -> KernelIR:
         [_factors_port(nu), Port("r", (nu,))],
         [Port("x", (nu,))],
         {"x": x},
-        as_made=True,
+        keep_order=True,
     )
 
 
@@ -190,7 +190,7 @@ class _RateKernels:
     def _rate_kernel(self) -> KernelIR:
         s = self._structure
         return self._graph.kernel(
-            "rates", _inputs(s), [Port("dq", (s.nq,))], {"dq": self._rates}, as_made=True
+            "rates", _inputs(s), [Port("dq", (s.nq,))], {"dq": self._rates}, keep_order=True
         )
 
     def _coordinates_kernel(self) -> KernelIR:
@@ -205,7 +205,7 @@ class _RateKernels:
             [*_inputs(s), *increment_ports],
             [Port("dq", (s.nq,))],
             {"dq": dq},
-            as_made=True,
+            keep_order=True,
         )
 
 
@@ -240,9 +240,9 @@ class _ResidualKernels:
         values: dict[str, object] = {"r": self._r, "power": [self._power]}
         rate: dict[str, object] = {"r_t": derivatives(self._r, {self._t: 1})}
         return [
-            graph.kernel("residual", ports, [r], {"r": self._r}, as_made=True),
-            graph.kernel("residual_power", ports, [r, power], values, as_made=True),
-            graph.kernel("residual_rate", ports, [Port("r_t", (s.nu,))], rate, as_made=True),
+            graph.kernel("residual", ports, [r], {"r": self._r}, keep_order=True),
+            graph.kernel("residual_power", ports, [r, power], values, keep_order=True),
+            graph.kernel("residual_rate", ports, [Port("r_t", (s.nu,))], rate, keep_order=True),
             *([self._known_increments_kernel(ports)] if rest else []),
             self._tangent_kernel(ports),
         ]
@@ -252,7 +252,7 @@ class _ResidualKernels:
         matrix = _transpose([self._tangent_column(j) for j in range(s.nu)])
         return graph.kernel(
             "tangent", [*ports, Port("steps", (3,))], [_factors_port(s.nu)],
-            {"factors": factor_reverse_lu(graph, matrix)}, as_made=True,
+            {"factors": factor_reverse_lu(graph, matrix)}, keep_order=True,
         )  # fmt: skip
 
     def _tangent_column(self, j: int) -> Nodes:
@@ -277,7 +277,7 @@ class _ResidualKernels:
             [*ports, *_known_ports(s)],
             [Port("rest", (s.nu,))],
             {"rest": remainder},
-            as_made=True,
+            keep_order=True,
         )
 
     def matrix_kernels(self) -> list[KernelIR]:
@@ -293,7 +293,7 @@ class _ResidualKernels:
         ports_out = [_slopes_port(s), _factors_port(s.nu)]
         values: dict[str, object] = {"slopes": stored, "factors": factor_reverse_lu(graph, matrix)}
         tangent = graph.kernel(
-            "tangent_slopes", [*ports, Port("steps", (3,))], ports_out, values, as_made=True
+            "tangent_slopes", [*ports, Port("steps", (3,))], ports_out, values, keep_order=True
         )
         return [tangent, self._stored_increments_kernel(ports, stored)]
 
@@ -327,5 +327,5 @@ class _ResidualKernels:
             [*ports, *_known_ports(s)],
             [Port("rest", (s.nu,))],
             {"rest": remainder},
-            as_made=True,
+            keep_order=True,
         )

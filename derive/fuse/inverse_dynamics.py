@@ -7,7 +7,7 @@ from mstmm.ir.graph import Node
 from mstmm.ir.inline import Nodes
 from mstmm.ir.scene_structure import Structure
 
-from ..schedule.mass_matrix import COMPOSITION, EXERTED, FELT_BY
+from ..schedule.mass_matrix import COMPOSITION, HINGE_EFFORTS, OUTBOARD_LOAD
 from ..schedule.pass_steps import Pass
 from ..schedule.sweeps import INVERSE_DYNAMICS
 from .fusion_state import FusionState, Kernels
@@ -32,12 +32,12 @@ def fuse_inverse(structure: Structure, kernels: Kernels) -> FusedSceneIR:
     inputs = [*inputs_of(structure)[:-1], Port("a", (structure.nu,))]
     outputs = [Port("required", (structure.nu,))]
     values: dict[str, object] = {"required": replay.collect("required")}
-    kernel_list = [state.graph.kernel("required", inputs, outputs, values, as_made=True)]
+    kernel_list = [state.graph.kernel("required", inputs, outputs, values, keep_order=True)]
     if not any(body.modal for body in structure.bodies):
         state = FusionState(structure, kernels, None)
         square = [Port("M", (structure.nu, structure.nu))]
         matrix: dict[str, object] = {"M": _Composition(state).matrix()}
-        kernel_list.append(state.graph.kernel("mass", inputs, square, matrix, as_made=True))
+        kernel_list.append(state.graph.kernel("mass", inputs, square, matrix, keep_order=True))
     return FusedSceneIR(BalancedKernels(*kernel_list), ((0, -1, FAILED),))
 
 
@@ -70,10 +70,10 @@ class _Composition:
             self._replay.fill("body.given", self._zeros(bodies[i].nu))
         self._enter(index)
         self._replay.fill(f"body.given[{speed}]", [self._one])
-        self._run_pass_at(EXERTED, index)
+        self._run_pass_at(OUTBOARD_LOAD, index)
         pairs = []
         for i in path:
-            self._run_pass_at(FELT_BY, i)
+            self._run_pass_at(HINGE_EFFORTS, i)
             loads = self._replay.get("body.required", bodies[i].nu)
             pairs += [(bodies[i].u + k, load) for k, load in enumerate(loads)]
         return pairs

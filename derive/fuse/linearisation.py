@@ -42,7 +42,7 @@ def fuse_linear(
         *(Port(name, (n, n)) for name in "MCK"), Port("N", (structure.nq, n)),
         Port("P", (n * len(numbers),)),
     ]  # fmt: skip
-    return scene.graph.kernel("linear", _inputs(structure), outputs, values, as_made=True)
+    return scene.graph.kernel("linear", _inputs(structure), outputs, values, keep_order=True)
 
 
 def fuse_slopes(structure: Structure, kernels: Kernels) -> FusedSceneIR:
@@ -67,7 +67,7 @@ def fuse_slopes(structure: Structure, kernels: Kernels) -> FusedSceneIR:
     values["G"] = scene.rate_matrices()
     values["r_t"] = [scene.input_derivative("t", 0, effort) for effort in scene.r]
     outputs = [*(Port(name, (n, n)) for name in "MCKG"), Port("r_t", (n,))]
-    kernel = scene.graph.kernel("linear", _inputs(structure), outputs, values, as_made=True)
+    kernel = scene.graph.kernel("linear", _inputs(structure), outputs, values, keep_order=True)
     kernel_map = {"accelerations": fuse(structure, kernels).kernels["accelerations"]}
     return FusedSceneIR(kernel_map | {kernel.name: balance(kernel)}, ((0, -1, FAILED),))
 
@@ -77,7 +77,7 @@ def fuse_required(structure: Structure, kernels: Kernels) -> KernelIR:
     state = FusionState(structure, kernels, None)
     outputs = [Port("required", (structure.nu,))]
     values: dict[str, object] = {"required": _inverse_dynamics(state).collect("required")}
-    return state.graph.kernel("required", _inputs(structure), outputs, values, as_made=True)
+    return state.graph.kernel("required", _inputs(structure), outputs, values, keep_order=True)
 
 
 class _StateDerivatives:

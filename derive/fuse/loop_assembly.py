@@ -21,13 +21,13 @@ from .schedule_interpreter import ScheduleInterpreter
 
 #: A change along the speeds moves the coordinates by the same relation q' = N u.
 _INCREMENT_PASS = Pass(
-    "moved", "body", "Change of the coordinates of a hinge and of modes.",
+    "increments", "body", "Change of the coordinates of a hinge and of modes.",
     (
         RunPass(whole=HINGE_MOTION, when="!section"),
         Copy(to="modes.qdot", source="modes.etad", when="modal"),
     ),
 )  # fmt: skip
-_INCREMENTS = Sweep("moved", "Change of the coordinates.", (Run(whole=_INCREMENT_PASS),))
+_INCREMENTS = Sweep("increments", "Change of the coordinates.", (Run(whole=_INCREMENT_PASS),))
 
 
 def slips(state: FusionState, inputs: list[Port]) -> KernelIR:
@@ -35,7 +35,7 @@ def slips(state: FusionState, inputs: list[Port]) -> KernelIR:
 
     The strain is the largest ratio of a row's rounding error to its pivot.
     """
-    replay, strain = ScheduleInterpreter(state, level="slipping"), state.zero
+    replay, strain = ScheduleInterpreter(state, level="velocity_error"), state.zero
     replay.sweep(CORRECTION)
     for row in range(len(state.structure.rows)):
         replay.enter(row_subject(state.structure.rows, row))
@@ -43,7 +43,7 @@ def slips(state: FusionState, inputs: list[Port]) -> KernelIR:
         strain = state.graph.call("max", strain, share)
     outputs = [Port("du", (state.structure.nu,)), Port("strain", (1,))]
     values: dict[str, object] = {"du": replay.collect("udot"), "strain": [strain]}
-    return state.graph.kernel("slips", inputs, outputs, values, as_made=True)
+    return state.graph.kernel("slips", inputs, outputs, values, keep_order=True)
 
 
 def gaps(state: FusionState, inputs: list[Port]) -> KernelIR:
@@ -53,7 +53,7 @@ def gaps(state: FusionState, inputs: list[Port]) -> KernelIR:
     of satisfied rows and that of redundant rows (m, rad); for each row the other number is
     zero.
     """
-    replay, closures = ScheduleInterpreter(state, level="gaping"), state.structure.closures
+    replay, closures = ScheduleInterpreter(state, level="position_gap"), state.structure.closures
     replay.sweep(CORRECTION)
     pairs = [pair for item in closures for pair in _closure_gaps(replay, item)]
     for item, lack in replay.lacks:
@@ -68,7 +68,7 @@ def gaps(state: FusionState, inputs: list[Port]) -> KernelIR:
         "dq": increments.collect("qdot"),
         "gap": [gap for gap, _ in pairs], "apart": [repeated for _, repeated in pairs],
     }  # fmt: skip
-    return state.graph.kernel("gaps", inputs, outputs, values, as_made=True)
+    return state.graph.kernel("gaps", inputs, outputs, values, keep_order=True)
 
 
 def _closure_gaps(

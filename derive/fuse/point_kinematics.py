@@ -22,21 +22,23 @@ from .optimisation.sum_balancing import BalancedKernels
 from .scene_kernels import FAILED, FusedSceneIR, inputs_of
 from .schedule_interpreter import ScheduleInterpreter
 
-MOVED = Sweep("moved", "Poses and velocities as they are given.", (*RATES.runs, Run(whole=POSES)))
+GIVEN_MOTION = Sweep(
+    "given_motion", "Poses and velocities as they are given.", (*RATES.runs, Run(whole=POSES))
+)
 
 
 def fuse_points(structure: Structure, kernels: Kernels, body: int) -> FusedSceneIR:
     """Kernels of points of a rigid `body`; inputs p, t, q, u, memory and the end.
 
-    The end is given by its offset (3) and axes (9) in body axes.  "placed": position (3) and
-    axes (9) of the end.  "moving": its velocity and angular velocity (6).  "jacobian": its
+    The end is given by its offset (3) and axes (9) in body axes.  "pose": position (3) and
+    axes (9) of the end.  "velocities": its velocity and angular velocity (6).  "jacobian": its
     columns by speed (6 x nu); "jacobian_rate": its time derivative along u.  Inertial axes;
     coordinates and speeds as given, also where they are prescribed or follow from closed loops.
     A failing guard does not name its cause: evaluate the looped engine for the message.
     """
     kernel_list = [
         _Point(structure, kernels, body).kernel(name)
-        for name in ("placed", "moving", "jacobian", "jacobian_rate")
+        for name in ("pose", "velocities", "jacobian", "jacobian_rate")
     ]
     return FusedSceneIR(BalancedKernels(*kernel_list), ((0, -1, FAILED),))
 
@@ -50,7 +52,7 @@ class _Point:
         while (parent := structure.bodies[self._path[-1]].parent) >= 0:
             self._path.append(parent)
         self._replay = ScheduleInterpreter(self._state, staged=False, way=self._path)
-        self._replay.sweep(MOVED)
+        self._replay.sweep(GIVEN_MOTION)
         end = self._state.graph.vector("end", 12)
         self._offset, self._axes = end[:3], end[3:]
         self._enter(body)
@@ -59,24 +61,24 @@ class _Point:
     def kernel(self, name: str) -> KernelIR:
         state, s = self._state, self._state.structure
         outputs = {
-            "placed": [Port("place", (3,)), Port("axes", (9,))],
-            "moving": [Port("velocity", (6,))],
+            "pose": [Port("place", (3,)), Port("axes", (9,))],
+            "velocities": [Port("velocity", (6,))],
         }.get(name, [Port("J", (6, s.nu))])
         for condition in self._replay.conditions:
             state.graph.guard(condition, FAILED, "the looped engine names what fails")
         values: dict[str, object] = getattr(self, f"_{name}")()
         inputs = [*inputs_of(s)[:-1], Port("end", (12,))]
-        return state.graph.kernel(name, inputs, outputs, values, as_made=True)
+        return state.graph.kernel(name, inputs, outputs, values, keep_order=True)
 
-    def _placed(self) -> dict[str, object]:
+    def _pose(self) -> dict[str, object]:
         axes = self._run_frame_kernel("end_frame", A=self._body_slot("A", 9), R_end=self._axes)[
             "A_end"
         ]
         return {"place": self._position, "axes": axes}
 
-    def _moving(self) -> dict[str, object]:
+    def _velocities(self) -> dict[str, object]:
         outputs = self._run_frame_kernel(
-            "turning", A=self._body_slot("A", 9), motion=self._body_slot("motion", 9),
+            "angular_motion", A=self._body_slot("A", 9), motion=self._body_slot("motion", 9),
             delta=self._state.zeros(6),
         )  # fmt: skip
         return {"velocity": [*self._velocity, *outputs["w_K"]]}

@@ -70,14 +70,16 @@ def fuse(
         "qdot": replay.collect("qdot"), "udot": replay.collect("udot"),
     }  # fmt: skip
     power: dict[str, object] = {port.name: replay.get(f"sums.{port.name}", 1) for port in sums}
-    kernel_list = [state.graph.kernel("accelerations", inputs_of(s), outputs, values, as_made=True)]
+    kernel_list = [
+        state.graph.kernel("accelerations", inputs_of(s), outputs, values, keep_order=True)
+    ]
     is_cheap = False
     flexible = any(body.modal is not None for body in s.bodies)
     if s.laws or s.driven or s.loads or s.forces or s.couplings or flexible:
         kernel_list.append(
             state.graph.kernel(
                 "accelerations_power", inputs_of(s), [*outputs, *sums], values | power,
-                as_made=True,
+                keep_order=True,
             )
         )  # fmt: skip
         alone, with_power = (kernel.flops() for kernel in kernel_list)
@@ -107,6 +109,6 @@ def fuse_solution(structure: Structure, kernels: Kernels) -> KernelIR:
         [*inputs_of(s), Port("column", (s.nu,))],
         [Port("answer", (s.nu + 1,))],
         {"answer": [*replay.collect("answer"), holds]},
-        as_made=True,
+        keep_order=True,
     )
     return balance(solution)

@@ -51,8 +51,8 @@ class ScheduleInterpreter(RowSlots):
 
     `staged`: transport stage by stage, so that known values fold; `inverse`: accelerations are
     given; `refined`: accelerations are a solution of the tree to which that of the residual is
-    added; `level`: corrected quantity of closed loops, "gaping" or "slipping"; `way`: evaluate
-    only these bodies, all with poses.
+    added; `level`: corrected quantity of closed loops, "position_gap" or "velocity_error"; `way`:
+    evaluate only these bodies, all with poses.
     """
 
     def __init__(
@@ -168,7 +168,7 @@ class ScheduleInterpreter(RowSlots):
             "efforts": True, "inverse": self.inverse, "weightless": False,
             "driving": not self.level,
             "laws": bool(s.laws), "driven": s.drives is not None,
-            "valued": s.values is not None, "posed": bool(self._bodies_posed),
+            "expressions": s.values is not None, "poses": bool(self._bodies_posed),
             "flexible": any(body.modal for body in s.bodies),
         }  # fmt: skip
         return traits[trait]
@@ -177,11 +177,11 @@ class ScheduleInterpreter(RowSlots):
         """Whether the subject has a trait; see `schedule.slot_definitions`."""
         if trait in ("balance", "efforts", "inverse", "weightless", "driving", "refined"):
             return self._scene_has(trait)
-        if trait in ("gaping", "slipping"):
+        if trait in ("position_gap", "velocity_error"):
             return self.level == trait
         if trait == "coordinate":
             return self.subject.law is not None and not self.subject.law.axes
-        if trait == "unmet":
+        if trait == "redundant":
             return self.subject.row < 0
         if trait == "effort":
             return self.subject.force is not None and self.subject.force.effort is not None
@@ -221,14 +221,14 @@ class ScheduleInterpreter(RowSlots):
             self.steps(_with_entry(inner, "c", subject.direction) for inner in step.steps)
         self.subject, self.local = at, local
 
-    def _rows_begun(self) -> None:
+    def _begin_rows(self) -> None:
         """Compute the errors of couplings; other row slots are initialised on first use."""
         self.lacks = list(coupling_inputs(self))
 
-    def _struck(self) -> None:
+    def _apply_impact(self) -> None:
         """Do nothing: impacts are computed by the looped engine only."""
 
-    def _rows_asked(self) -> None:
+    def _set_row_targets(self) -> None:
         """Do nothing: rows have no target beyond closure."""
 
     def _run_kernel(self, step: Call) -> None:
@@ -289,9 +289,9 @@ class ScheduleInterpreter(RowSlots):
         """Length of a slot that is filled with zeros."""
         if slot in _LOCAL_SIZES:
             return _LOCAL_SIZES[slot]
-        _, _, picked = slot.partition("[")
-        if picked:
-            return len(picked.split())
+        _, _, entries = slot.partition("[")
+        if entries:
+            return len(entries.split())
         size = SLOTS[slot].size
         if size.isdigit():
             return int(size)
@@ -320,8 +320,8 @@ class ScheduleInterpreter(RowSlots):
 
     def _select_columns(self, step: SelectColumns) -> None:
         source, nu = self.get(step.source, 0), self.body.nu
-        picked = [source[row * nu + k] for row in range(step.rows) for k in self.free_speeds()]
-        self.fill(step.to, picked)
+        selected = [source[row * nu + k] for row in range(step.rows) for k in self.free_speeds()]
+        self.fill(step.to, selected)
 
     def _scatter_speeds(self, step: ScatterSpeeds) -> None:
         free, nu = self.free_speeds(), self.body.nu
@@ -368,15 +368,15 @@ class ScheduleInterpreter(RowSlots):
         if any(body.imposed) or any(isinstance(x, int) or x != 0.0 for x in body.rotor):
             return
         subspace, motion = self.get(step.subspace, 0), list(self.get(step.motion, 9))
-        chosen = self.state.zeros(nu)
+        offset = self.state.zeros(nu)
         for k in range(nu):
             row = unit_row(subspace[k::nu])
             if row is not None:
                 entry = row + 6 if row < 3 else row  # motion is w, wd, rdd
-                chosen[k] = -motion[entry]
+                offset[k] = -motion[entry]
                 motion[entry] = self.state.zero
         self.fill(step.motion, motion)
-        self.fill(step.chosen, chosen)
+        self.fill(step.offset, offset)
 
     def _check_pivots(self, step: CheckPivots) -> None:
         """Guard pivots relative to the body's own inertia, or the composite one if zero."""
@@ -431,9 +431,9 @@ _TRAITS: dict[str, Callable[[ScheduleInterpreter, BodyStructure], bool]] = {
     "special": lambda replay, body: replay.has_own_elimination(),
     "free": lambda replay, body: bool(replay.free_speeds()),
     "imposed": lambda replay, body: any(body.imposed),
-    "hung": lambda replay, body: body.parent >= 0,
+    "on_body": lambda replay, body: body.parent >= 0,
     "link": lambda replay, body: bool(body.link),
-    "turned": lambda replay, body: bool(body.link) and body.link[3] != 0.0,
+    "rotated": lambda replay, body: bool(body.link) and body.link[3] != 0.0,
     "idle": lambda replay, body: body.idle,
     "modal": lambda replay, body: body.modal is not None,
     "section": lambda replay, body: body.section is not None,
@@ -441,18 +441,18 @@ _TRAITS: dict[str, Callable[[ScheduleInterpreter, BodyStructure], bool]] = {
     "drag": lambda replay, body: body.modal is not None and bool(body.modal.drag),
     "moving": lambda replay, body: body.section is None and bool(replay.free_speeds()),
     "cut": lambda replay, body: replay.closure() is not None,
-    "aside": lambda replay, body: body.idle or replay.closure() is not None,
+    "omitted": lambda replay, body: body.idle or replay.closure() is not None,
     "coupled": lambda replay, body: replay.is_coupled(),
     "hinged": lambda replay, body: replay.has_closure("hinge"),
     "distance": lambda replay, body: replay.has_closure("distance"),
     "plane": lambda replay, body: replay.has_closure("plane"),
     "rolling": lambda replay, body: replay.has_closure("rolling"),
-    "placing": lambda replay, body: False,
-    "kept": lambda replay, body: not replay.level,
+    "gap_closing": lambda replay, body: False,
+    "loads_read": lambda replay, body: not replay.level,
     "corrected": lambda replay, body: bool(replay.level),
     "soft": lambda replay, body: bool(replay.row().soft),
     "inside": lambda replay, body: replay.row().body >= 0,
-    "unmoved": lambda replay, body: replay.is_inactive(),
+    "immobile": lambda replay, body: replay.is_inactive(),
 }
 
 _EXECUTE: dict[type, Callable[..., None]] = {

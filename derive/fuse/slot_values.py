@@ -182,7 +182,7 @@ class Slots:
             return f.q[q]
         if name in ("u", "efforts", "column", "given"):
             return {"u": f.u, "given": f.given_accelerations}.get(name, f.efforts)[u]
-        if name in ("chosen", "answer", "required"):
+        if name in ("bias_offset", "answer", "required"):
             return f.zeros(body.nu)
         return f.entries({"p": body.body_p, "rotor": body.rotor}[name])
 

@@ -11,7 +11,7 @@ for methods that allow an approximate tangent.
 from __future__ import annotations
 
 from .differentiated_passes import D
-from .mass_matrix_solve import COLUMN, COLUMN_ANSWERED, COLUMN_CARRIED, FACTORISE
+from .mass_matrix_solve import COLUMN, COLUMN_BACKWARD, COLUMN_FORWARD, FACTORISE
 from .pass_steps import (
     Add,
     Copy,
@@ -26,7 +26,7 @@ from .pass_steps import (
     only,
     with_renamed_slots,
 )
-from .tangent_sweep import HINGE_CHANGE, KNOWN_LAWS, LAW_CHANGE
+from .tangent_sweep import HINGE_CHANGE, INCREMENT_LAWS, LAW_CHANGE
 
 #: Slot of the mass matrix -> slot of this tangent.
 _SLOTS = {
@@ -36,10 +36,10 @@ _SLOTS = {
         slot: D + slot
         for slot in (
             "body.e", "body.tau", "body.delta", "hinge.rates", "parent.e", "parent.delta",
-            "modes.e_f", "modes.etadd", "modes.felt",
+            "modes.e_f", "modes.etadd", "modes.load_effort",
         )
     },
-    **{f"modes.{name}": f"shapes.{name}" for name in ("S_rf", "based", "S_ff", "right", "gain")},
+    **{f"modes.{name}": f"shapes.{name}" for name in ("S_rf", "S_rf_I", "S_ff", "right", "gain")},
     "modes.work": "bend.work", "section.push": "port.K",
 }  # fmt: skip
 _NAME = "laws"
@@ -55,7 +55,7 @@ LAWS_OWN = Pass(
             "modal",
             Copy(to="shapes.S_rf", source="modes.S_rf"),
             Copy(to="shapes.S_ff", source="modes.S_ff"),
-            call("modal.stiffened", K="modes.K", D="modes.D", rate="step.rate", sq="step.q",
+            call("modal.step_stiffness", K="modes.K", D="modes.D", rate="step.rate", sq="step.q",
                  S_ff="shapes.S_ff"),
         ),
     ),
@@ -98,8 +98,8 @@ LAWS_FACTORISE = Pass(
     order=FACTORISE.order, skip=FACTORISE.skip,
 )  # fmt: skip
 
-LAWS_ALONE = Sweep(
-    "laws_alone",
+APPROXIMATE_TANGENT = Sweep(
+    "approximate_tangent",
     "Mass matrix and derivatives of laws factored, after inverse dynamics.",
     (
         Run(whole=LAWS_OWN),
@@ -114,21 +114,21 @@ LAWS_ALONE = Sweep(
 MODES_CHANGE = Pass(
     "modes_change", "body", "Change of the modal loads due to known increments.",
     (
-        call("modal.strained", K="modes.K", D="modes.D", eta=D + "modes.eta",
+        call("modal.strain_load", K="modes.K", D="modes.D", eta=D + "modes.eta",
              etad=D + "modes.etad", e_f=D + "modes.e_f"),
     ),
     skip="!modal",
 )  # fmt: skip
 
-LAWS_SOLUTION = Sweep(
-    "laws_solution",
+APPROXIMATE_SOLUTION = Sweep(
+    "approximate_solution",
     "One right-hand side solved with the mass matrix and laws.",
     (
         Run(whole=with_renamed_slots(COLUMN, _NAME, _SLOTS)),
-        Run(whole=KNOWN_LAWS, when="shifted laws"),
+        Run(whole=INCREMENT_LAWS, when="shifted laws"),
         Run(whole=MODES_CHANGE, when="shifted flexible"),
-        Run(whole=with_renamed_slots(COLUMN_CARRIED, _NAME, _SLOTS)),
-        Run(whole=with_renamed_slots(COLUMN_ANSWERED, _NAME, _SLOTS)),
+        Run(whole=with_renamed_slots(COLUMN_BACKWARD, _NAME, _SLOTS)),
+        Run(whole=with_renamed_slots(COLUMN_FORWARD, _NAME, _SLOTS)),
     ),
 )
 

@@ -13,16 +13,17 @@ from .pass_steps import Add, EachSpeed, ForEach, Pass, Step, call, only
 
 #: Contribution of the accelerations of a tree hinge to the rows that name it.
 EFFORTS_TO_KNOWN = call(
-    "generic{nu}.answered", when="coupled", y="body.s", z="pending.tau", l="pending.known"
+    "generic{nu}.add_known_part", when="coupled", y="body.s", z="pending.tau", l="pending.known"
 )
 #: The same for the accelerations chosen in the bias motion.
 BIAS_EFFORTS_TO_KNOWN = replace(
-    EFFORTS_TO_KNOWN, ports=(("y", "body.chosen"), ("z", "pending.tau"), ("l", "pending.known"))
+    EFFORTS_TO_KNOWN,
+    ports=(("y", "body.bias_offset"), ("z", "pending.tau"), ("l", "pending.known")),
 )
 #: The same for a hinge that closes a loop: accelerations along its rows, and prescribed ones.
 _OWN_ROW_TERMS = (
-    call("generic{nu}.answered", y="closure.l", z="own.tau", l="own.known"),
-    call("generic{nu}.answered", y="body.s", z="own.tau", l="own.known"),
+    call("generic{nu}.add_known_part", y="closure.l", z="own.tau", l="own.known"),
+    call("generic{nu}.add_known_part", y="body.s", z="own.tau", l="own.known"),
 )
 #: Rows of couplings on a hinge's own speeds start on both sides of it.
 OWN_COUPLINGS = ForEach(
@@ -30,8 +31,8 @@ OWN_COUPLINGS = ForEach(
     steps=(
         EachSpeed(
             steps=(
-                call("loops.act", J="closure.J_A[6 * k]", tau="own.tau[k]", e="own.inner"),
-                call("loops.act", J="closure.J_B[6 * k]", tau="own.tau[k]", e="own.outer"),
+                call("loops.apply_effort", J="closure.J_A[6 * k]", tau="own.tau[k]", e="own.inner"),
+                call("loops.apply_effort", J="closure.J_B[6 * k]", tau="own.tau[k]", e="own.outer"),
             ),
         ),
         *_OWN_ROW_TERMS,
@@ -41,7 +42,7 @@ OWN_COUPLINGS = ForEach(
 OWN_COUPLINGS_BIAS = ForEach(
     of="own",
     when="staged !corrected",
-    steps=(call("generic{nu}.answered", y="body.chosen", z="own.tau", l="own.known"),),
+    steps=(call("generic{nu}.add_known_part", y="body.bias_offset", z="own.tau", l="own.known"),),
 )
 #: The same with known multipliers.
 OWN_EFFORTS_TO_KNOWN = ForEach(of="own", steps=_OWN_ROW_TERMS)
@@ -49,34 +50,35 @@ OWN_EFFORTS_TO_KNOWN = ForEach(of="own", steps=_OWN_ROW_TERMS)
 
 def efforts_of_own(x: str, when: str) -> ForEach:
     """Efforts of couplings on own speeds, from their multipliers."""
-    pull = call("generic{nu}.pull", y="own.tau", x=x, y_0="body.tau")
-    return ForEach(of="own", when=when, steps=(pull,))
+    effort_call = call("generic{nu}.add_multiplier_effort", y="own.tau", x=x, y_0="body.tau")
+    return ForEach(of="own", when=when, steps=(effort_call,))
 
 
 def efforts_of(x: str, when: str, *more: Step) -> ForEach:
     """Efforts of the couplings of a tree hinge, from their multipliers."""
-    pull = call("generic{nu}.pull", when="coupled", y="pending.tau", x=x, y_0="body.tau")
-    return ForEach(of="pending", when=when, steps=(pull, *more))
+    effort_call = call("generic{nu}.add_multiplier_effort", when="coupled", y="pending.tau", x=x,
+                       y_0="body.tau")  # fmt: skip
+    return ForEach(of="pending", when=when, steps=(effort_call, *more))
 
 
 #: Multipliers are known from an earlier evaluation of accelerations in this workspace.
-COUPLINGS_LOADED = Pass(
-    "couplings_loaded", "body",
+COUPLING_LOADS = Pass(
+    "coupling_loads", "body",
     "Rows of couplings at the given accelerations, and the efforts of their multipliers.",
     (efforts_of("pending.x", "", EFFORTS_TO_KNOWN),),
-    skip="aside",
+    skip="omitted",
 )  # fmt: skip
 
-COUPLINGS_ANSWERED = Pass(
-    "couplings_answered", "coupling",
+COUPLING_MULTIPLIERS = Pass(
+    "coupling_multipliers", "coupling",
     "Multipliers of couplings, and the power supplied by time-dependent couplings.",
     (
-        Add(to="coupling.x", source="coupling.told", when="refined"),
+        Add(to="coupling.x", source="coupling.previous_x", when="refined"),
         *only(
             "balance",
-            call("frames.speed_power", tau="coupling.x", u="coupling.still", P="local.P"),
+            call("frames.speed_power", tau="coupling.x", u="coupling.time_rate", P="local.P"),
             Add(to="sums.power", source="local.P"),
         ),
     ),
-    skip="unmet",
+    skip="redundant",
 )  # fmt: skip

@@ -25,12 +25,12 @@ SECTION_MOTION = Pass(
     "section_motion", "body", "Relative motion across a section of a flexible body.",
     (
         call("modal.section", **_SECTION_DATA, **_STATE, Phi="section.Phi", **_MOTION_PORTS),
-        call("modal.outward", when="outward", fails="section", R_end="section.end",
+        call("modal.end_motion", when="outward", fails="section", R_end="section.end",
              **_MOTION_PORTS, **_HINGE_PORTS),
-        call("modal.inward", when="!outward", fails="section", R_end="section.end",
+        call("modal.frame_motion", when="!outward", fails="section", R_end="section.end",
              **_MOTION_PORTS, **_HINGE_PORTS),
         call("modal.subspace", H6="section.H6", Phi="section.Phi", H="section.H"),
-        call("modal.imposed", when="inverse", H="section.H", s="modes.given", c="hinge.c",
+        call("modal.prescribed_bias", when="inverse", H="section.H", s="modes.given", c="hinge.c",
              c_s="local.c"),
         Copy(to="hinge.c", source="local.c", when="inverse"),
     ),
@@ -43,7 +43,7 @@ MODAL_OWN = Pass(
              motion="body.motion", S="body.S", S_rf="modes.S_rf", A="modes.A", S_ff="modes.S_ff",
              e="body.e", e_f="modes.e_f"),
         Copy(to="modes.qdot", source="modes.etad"),
-        call("modal.prescribed", when="inverse", S_rf="modes.S_rf", S_ff="modes.S_ff",
+        call("modal.prescribed_load", when="inverse", S_rf="modes.S_rf", S_ff="modes.S_ff",
              s="modes.given", e="body.e", e_f="modes.e_f"),
     ),
 )  # fmt: skip
@@ -55,9 +55,9 @@ MODAL_CONDENSE = Pass(
     (
         Add(to="modes.e_f", source="modes.efforts", times=-1, when="efforts"),
         call("modal.rebase", when="section", H="section.H", S="body.S", e="body.e",
-             S_rf="modes.S_rf", S_rf_I="modes.based", S_ff="modes.S_ff", e_f="modes.e_f"),
+             S_rf="modes.S_rf", S_rf_I="modes.S_rf_I", S_ff="modes.S_ff", e_f="modes.e_f"),
         call("modal.condense", when="section", fails="modes", S="body.S", e="body.e",
-             S_rf="modes.based", S_ff="modes.S_ff", e_f="modes.e_f", work="modes.work",
+             S_rf="modes.S_rf_I", S_ff="modes.S_ff", e_f="modes.e_f", work="modes.work",
              **_CONDENSED),
         call("modal.condense", when="!section", fails="modes", S="body.S", e="body.e",
              S_rf="modes.S_rf", S_ff="modes.S_ff", e_f="modes.e_f", work="modes.work",
@@ -69,21 +69,21 @@ MODAL_CONDENSE = Pass(
 
 #: Contribution of the bodies outboard of an end to the modes of the flexible body.
 PORT_ASSEMBLY = call(
-    "modal.absorb", Rc="hinge.R", r="hinge.d", H="section.H", S="body.S", e="body.e",
+    "modal.assemble_port", Rc="hinge.R", r="hinge.d", H="section.H", S="body.S", e="body.e",
     U="section.push", S_rf="modes.S_rf", S_ff="modes.S_ff", e_f="modes.e_f",
 )  # fmt: skip
 
 #: Contribution of the modes to the deviation outboard of a section.
 PORT_MOTION = (
-    call("modal.displaced", H="section.H", etadd="modes.etadd", delta_I="body.delta",
+    call("modal.port_deviation", H="section.H", etadd="modes.etadd", delta_I="body.delta",
          delta="local.delta"),
     Copy(to="body.delta", source="local.delta"),
 )  # fmt: skip
 
 #: Modal efforts of the load on a section.
 MODAL_EFFORT = (
-    call("modal.modal_effort", H="section.H", e="body.e", e_f="modes.e_f", tau="modes.felt"),
-    Copy(to="modes.e_f", source="modes.felt"),
+    call("modal.modal_effort", H="section.H", e="body.e", e_f="modes.e_f", tau="modes.load_effort"),
+    Copy(to="modes.e_f", source="modes.load_effort"),
 )
 
 STRAIN = Pass(
@@ -101,9 +101,10 @@ DRAG = Pass(
     "drag", "body", "Viscous drag of flexible bodies: momentum with the drag as density.",
     (
         call("modal.momentum", **_DRAG, **_STATE, v="body.v", w="body.w", S="local.S",
-             S_rf="modes.based", A="modes.A_drag", h="local.h", h_f="modes.felt", T="local.T"),
+             S_rf="modes.S_rf_I", A="modes.A_drag", h="local.h", h_f="modes.load_effort",
+             T="local.T"),
         Add(to="body.e", source="local.h"),
-        Add(to="modes.e_f", source="modes.felt"),
+        Add(to="modes.e_f", source="modes.load_effort"),
         Add(to="sums.power", source="local.T", times=-2, when="balance"),
     ),
     order=ROOT_TO_TIPS, skip="!drag",
@@ -113,7 +114,7 @@ MOMENTUM = Pass(
     "momentum", "body", "Mass matrix of the frame, momentum and energy of a flexible body.",
     (
         call("modal.momentum", **_MOMENTS, **_STATE, v="body.v", w="body.w", S="given.S",
-             S_rf="modes.based", A="modes.A", h="given.h", h_f="modes.felt", T="given.T"),
+             S_rf="modes.S_rf_I", A="modes.A", h="given.h", h_f="modes.load_effort", T="given.T"),
     ),
     given=("given.S", "given.h", "given.T"),
 )  # fmt: skip

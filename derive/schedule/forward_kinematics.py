@@ -14,8 +14,8 @@ STILL = {
 }  # fmt: skip
 COORDINATES = {"p": "hinge.p", "q": "body.q", "u": "body.u"}
 
-PRESCRIBED = Pass(
-    "prescribed", "body", "Given accelerations: all, or zero.",
+PRESCRIBED_ACCELERATIONS = Pass(
+    "prescribed_accelerations", "body", "Given accelerations: all, or zero.",
     (
         Copy(to="body.s", source="body.given", when="inverse"),
         Copy(to="body.s", when="!inverse"),
@@ -39,7 +39,7 @@ HINGE_MOTION = Pass(
         call("hinge.hinge", fails="hinge", **COORDINATES, **HINGE, qdot="body.qdot"),
         # The constant part of the hinge's own screw, where the connection is an axial link.
         Add(to="hinge.d", source="link.lift", when="link"),
-        call("hinge.hinge", when="turned", p="hinge.p", q="link.q", u="body.u", R="hinge.R"),
+        call("hinge.hinge", when="rotated", p="hinge.p", q="link.q", u="body.u", R="hinge.R"),
     ),
 )  # fmt: skip
 
@@ -50,7 +50,7 @@ FORWARD = Pass(
         RunPass(whole=HINGE_MOTION, when="parts !section !whole"),
         call("hinge.forward", when="own", fails="hinge", **CONNECTION, **COORDINATES, s="body.s",
              motion_I="parent.motion", **BODY, qdot="body.qdot"),
-        call("hinge.forward_kept", when="whole", fails="hinge", **CONNECTION, **COORDINATES,
+        call("hinge.body_motion", when="whole", fails="hinge", **CONNECTION, **COORDINATES,
              **HINGE, s="body.s", motion_I="parent.motion", **BODY, qdot="body.qdot"),
         call("generic{nu}.forward", when="parts !staged !whole", fails="hinge", **CONNECTION,
              **HINGE, s="body.s", motion_I="parent.motion", **BODY),
@@ -59,7 +59,7 @@ FORWARD = Pass(
         call("generic{nu}.forward", when="staged", Rt="identity", ro="zero", **HINGE, s="body.s",
              motion_I="connection.motion", motion="body.motion"),
         # In a refinement the bias motion is that of the solution.
-        ChooseBias(subspace="hinge.H", motion="body.motion", chosen="body.chosen",
+        ChooseBias(subspace="hinge.H", motion="body.motion", offset="body.bias_offset",
                    when="staged !refined"),
         RunPass(whole=MODAL_OWN, when="modal"),
         call("body.inertia", when="!modal !weightless", p="body.p", S="body.S"),

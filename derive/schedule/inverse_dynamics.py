@@ -11,15 +11,15 @@ EFFORT_AND_TRANSPORT = (
     call("generic{nu}.effort", H="hinge.H", f="body.e", tau="local.tau"),
     EachSpeed(
         steps=(
-            call("frames.driven_effort", felt="local.tau[k]", J="body.rotor[k]",
+            call("frames.driven_effort", load="local.tau[k]", J="body.rotor[k]",
                  udot="body.given[k]", tau="body.tau[k]", tau_d="body.required[k]"),
         ),
     ),
     call("frames.transport", Rc="body.R", r="body.r", e="body.e", e_I="parent.e"),
 )  # fmt: skip
 
-REQUIRED = Pass(
-    "required", "body", "Efforts required beyond those of the laws, and the load on the parent.",
+REQUIRED_EFFORTS = Pass(
+    "required_efforts", "body", "Efforts required beyond those of laws, and load on the parent.",
     (
         *only("section", *MODAL_EFFORT),
         Copy(to="modes.required", source="modes.e_f", when="modal"),

@@ -11,12 +11,12 @@ from dataclasses import replace
 
 from .pass_steps import Add, Copy, EachSpeed, Pass, call
 
-RESTATED = Pass(
-    "restated", "body", "Efforts less those of the rotors at the accelerations of the solution.",
+ROTOR_RESIDUAL = Pass(
+    "rotor_residual", "body", "Efforts less those of the rotors at the computed accelerations.",
     (
         EachSpeed(
             steps=(
-                call("frames.driven_effort", felt="zero", J="body.rotor[k]", udot="body.s[k]",
+                call("frames.driven_effort", load="zero", J="body.rotor[k]", udot="body.s[k]",
                      tau="body.tau[k]", tau_d="local.lack"),
                 Copy(to="body.tau[k]"),
                 Add(to="body.tau[k]", source="local.lack", times=-1),
@@ -25,7 +25,7 @@ RESTATED = Pass(
         # Prescribed speeds have no equation.
         EachSpeed(
             steps=(
-                call("frames.driven_effort", felt="zero", J="body.rotor[k]", udot="body.s[k]",
+                call("frames.driven_effort", load="zero", J="body.rotor[k]", udot="body.s[k]",
                      tau="zero", tau_d="local.rotor"),
                 Add(to="body.tau[k]", source="local.rotor"),
             ),
@@ -36,4 +36,4 @@ RESTATED = Pass(
 )  # fmt: skip
 
 #: For trees without cut hinges.
-RESTATED_OF_TREE = replace(RESTATED, name="restated_of_tree", skip="")
+ROTOR_RESIDUAL_OF_TREE = replace(ROTOR_RESIDUAL, name="rotor_residual_of_tree", skip="")

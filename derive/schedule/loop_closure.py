@@ -58,7 +58,7 @@ def _row(k: str) -> Call:
 
 
 def _known_rows_call(relative: str, when: str) -> Call:
-    return call("loops.known", when=when, W="closure.W", relative=relative, l="closure.l")
+    return call("loops.known_parts", when=when, W="closure.W", relative=relative, l="closure.l")
 
 
 def _gap_calls(when: str) -> tuple[Call, ...]:
@@ -70,7 +70,7 @@ _RELATIVE_MOTION = (
     call("frames.pose", when="staged", A_I="connection.R", x_I="connection.r", Rc="hinge.R",
          r="hinge.d", A="body.R", x="body.r"),
     call("generic{nu}.complement", when="hinged", fails="hinge", H="hinge.H", W="closure.W"),
-    call("loops.meet", A_C="body.A", x_C="body.x", A_B="outboard.A", x_B="outboard.x",
+    call("loops.relative_pose", A_C="body.A", x_C="body.x", A_B="outboard.A", x_B="outboard.x",
          r_e="closure.end", **BODY, R_C="closure.R_C", r_A="closure.lever", d="closure.d"),
     call("loops.slip", **_END_PORTS, d="closure.d", v_C="body.v", w_C="body.w", v_B="outboard.v",
          w_B="outboard.w", slip="closure.slip"),
@@ -87,7 +87,7 @@ _DRIFT = call("loops.drift", **_END_PORTS, d="closure.d", slip="closure.slip",
               drift="local.drift")  # fmt: skip
 #: Alternative for steps that close gaps by accelerations.
 _REQUIRED_ACCELERATION = call(
-    "loops.closing", gap="closure.gap", rate="step.closing", relative="local.relative"
+    "loops.required_acceleration", gap="closure.gap", rate="step.closing", relative="local.relative"
 )
 #: Terms of rotating directions.
 _DIRECTION_RATES = (
@@ -100,27 +100,34 @@ _DIRECTION_RATES = (
 _EFFORTS = EachSpeed(
     steps=(
         _row("k"),
-        call("loops.act", J="closure.J_A[6 * k]", tau="body.tau[k]", e="parent.e"),
-        call("loops.act", J="closure.J_B[6 * k]", tau="body.tau[k]", e="outboard.e"),
+        call("loops.apply_effort", J="closure.J_A[6 * k]", tau="body.tau[k]", e="parent.e"),
+        call("loops.apply_effort", J="closure.J_B[6 * k]", tau="body.tau[k]", e="outboard.e"),
     )
 )
 
+
+def _multiplier_loads(x: str) -> tuple[Call, Call]:
+    """Load of a row's multiplier on both bodies."""
+    return (
+        call("loops.apply_multiplier", K="closure.J_A[6 * c]", x=x, e="parent.e"),
+        call("loops.apply_multiplier", K="closure.J_B[6 * c]", x=x, e="outboard.e"),
+    )
+
+
 CLOSURES = Pass(
-    "closures",
-    "body",
+    "closures", "body",
     "Rows of the element that closes a loop, and the load of the laws of a hinge.",
     (
         *_RELATIVE_MOTION,
-        *_gap_calls("gaping"),
-        *_gap_calls("placing"),
+        *_gap_calls("position_gap"),
+        *_gap_calls("gap_closing"),
         *_CONSTRAINT_STEPS,
-        _known_rows_call("closure.gap", "gaping"),
-        _known_rows_call("closure.slip", "slipping"),
-        efforts_of_own("own.told", "refined"),
-        *only(
-            "!corrected !placing", _DRIFT, *_DIRECTION_RATES, _known_rows_call("local.drift", "")
-        ),
-        *only("placing", _REQUIRED_ACCELERATION, _known_rows_call("local.relative", "")),
+        _known_rows_call("closure.gap", "position_gap"),
+        _known_rows_call("closure.slip", "velocity_error"),
+        efforts_of_own("own.previous_x", "refined"),
+        *only("!corrected !gap_closing", _DRIFT, *_DIRECTION_RATES,
+              _known_rows_call("local.drift", "")),
+        *only("gap_closing", _REQUIRED_ACCELERATION, _known_rows_call("local.relative", "")),
         _EFFORTS,
         ForEach(
             of="rows",
@@ -133,16 +140,9 @@ CLOSURES = Pass(
                 Copy(to="line.known", when="corrected soft"),
                 *only(
                     "refined",
-                    call("loops.loaded", K="closure.J_A[6 * c]", x="line.told", e="parent.e"),
-                    call("loops.loaded", K="closure.J_B[6 * c]", x="line.told", e="outboard.e"),
-                    call(
-                        "loops.yielded",
-                        when="soft",
-                        softness="line.softness",
-                        s="body.s[c]",
-                        x="line.told",
-                        l="line.known",
-                    ),
+                    *_multiplier_loads("line.previous_x"),
+                    call("loops.rotor_row_residual", when="soft", softness="line.softness",
+                         s="body.s[c]", x="line.previous_x", l="line.known"),
                 ),
             ),
         ),
@@ -150,11 +150,11 @@ CLOSURES = Pass(
         OWN_COUPLINGS_BIAS,
     ),
     skip="!cut",
-)
+)  # fmt: skip
 
 #: Multipliers are known from an earlier evaluation of accelerations in this workspace.
-CLOSURES_LOADED = Pass(
-    "closures_loaded", "body", "Rows of a cut hinge, and its complete load on its bodies.",
+CLOSURE_LOADS = Pass(
+    "closure_loads", "body", "Rows of a cut hinge, and its complete load on its bodies.",
     (
         *_RELATIVE_MOTION,
         *_CONSTRAINT_STEPS,
@@ -163,14 +163,7 @@ CLOSURES_LOADED = Pass(
         _known_rows_call("local.drift", ""),
         efforts_of_own("own.x", ""),
         _EFFORTS,
-        ForEach(
-            of="rows",
-            steps=(
-                _row("c"),
-                call("loops.loaded", K="closure.J_A[6 * c]", x="line.x", e="parent.e"),
-                call("loops.loaded", K="closure.J_B[6 * c]", x="line.x", e="outboard.e"),
-            ),
-        ),
+        ForEach(of="rows", steps=(_row("c"), *_multiplier_loads("line.x"))),
         OWN_EFFORTS_TO_KNOWN,
     ),
     skip="!cut",
@@ -179,23 +172,23 @@ CLOSURES_LOADED = Pass(
 _ROW = {"inverse": "row.inverse", "l": "row.known"}
 _COLUMN = {"inverse": "row.inverse", "K": "row.K"}
 
-ROW_CLOSED = Pass(
-    "row_closed", "row", "A row eliminated on the body where its ends meet.",
+ROW_ELIMINATION = Pass(
+    "row_elimination", "row", "A row eliminated on the body where its ends meet.",
     (
-        Copy(to="row.inverse", when="unmoved"),
-        call("loops.settle", when="!unmoved", inverse="row.inverse", L="row.pivot",
+        Copy(to="row.inverse", when="immobile"),
+        call("loops.pivot_inverse", when="!immobile", inverse="row.inverse", L="row.pivot",
              floor="row.floor"),
-        call("loops.close", when="!unmoved inside", **_COLUMN, l="row.known", S="meeting.S",
-             e="meeting.e"),
+        call("loops.eliminate_row", when="!immobile inside", **_COLUMN, l="row.known",
+             S="meeting.S", e="meeting.e"),
         ForEach(
             of="others",
             steps=(
-                call("loops.shed", when="inside", **_COLUMN, L_p="other.L", K_p="other.K"),
-                call("loops.shed_known", **_ROW, L_p="other.L", l_p="other.known"),
+                call("loops.update_column", when="inside", **_COLUMN, L_p="other.L", K_p="other.K"),
+                call("loops.update_known_part", **_ROW, L_p="other.L", l_p="other.known"),
                 ForEach(
                     of="seconds",
                     steps=(
-                        call("loops.shed_pair", inverse="row.inverse", L_p="other.L",
+                        call("loops.update_coupling", inverse="row.inverse", L_p="other.L",
                              L_q="second.L", L_pq="both.L"),
                     ),
                 ),
@@ -204,15 +197,16 @@ ROW_CLOSED = Pass(
     ),
 )  # fmt: skip
 
-ROW_FOUND = Pass(
-    "row_found", "row", "The multiplier of a row, from the motion of the body where it closes.",
+ROW_MULTIPLIER = Pass(
+    "row_multiplier", "row", "Multiplier of a row, from the motion of the body where it closes.",
     (
         call("loops.multiplier", **_ROW, x="row.x"),
-        call("loops.multiplier_more", when="inside", **_COLUMN, delta="meeting.delta", x="row.x"),
+        call("loops.multiplier_of_motion", when="inside", **_COLUMN, delta="meeting.delta",
+             x="row.x"),
         ForEach(
             of="others",
             steps=(
-                call("loops.multiplier_less", inverse="row.inverse", L_p="other.L",
+                call("loops.multiplier_of_row", inverse="row.inverse", L_p="other.L",
                      x_p="other.x", x="row.x"),
             ),
         ),
@@ -220,22 +214,22 @@ ROW_FOUND = Pass(
     order=TIPS_TO_ROOT,
 )  # fmt: skip
 
-UNLOADED = Pass(
-    "unloaded", "body", "Loads and efforts set to zero: only the rows are to be satisfied.",
+CLEAR_LOADS = Pass(
+    "clear_loads", "body", "Loads and efforts set to zero: only the rows are to be satisfied.",
     (Copy(to="body.e"), Copy(to="body.tau"), *only("modal", Copy(to="modes.e_f"))),
 )  # fmt: skip
 
 #: Elimination of modes from rows that pass or end at a flexible body, after S and e.
-_ROWS_CONDENSED = ForEach(
+_ROW_CONDENSATION = ForEach(
     of="bent",
     steps=(
-        call("modal.row_felt", when="section", H="section.H", K="bent.K", K_f="bent.modes"),
-        call("modal.row_condensed", S_ff="modes.S_ff", K_f="bent.modes", Gg="modes.gain",
+        call("modal.modal_column", when="section", H="section.H", K="bent.K", K_f="bent.modes"),
+        call("modal.condense_row", S_ff="modes.S_ff", K_f="bent.modes", Gg="modes.gain",
              work="modes.work", Y="bent.y", K="bent.K", l="bent.known"),
         ForEach(
             of="bent_before",
             steps=(
-                call("modal.row_coupled", K_f="bent_before.modes", Y="bent.y",
+                call("modal.row_coupling", K_f="bent_before.modes", Y="bent.y",
                      L_ij="bent_pair.L"),
             ),
         ),
@@ -244,7 +238,8 @@ _ROWS_CONDENSED = ForEach(
 _MODAL_SOLUTION = (
     call("modal.recover", Gg="modes.gain", delta_I="body.delta", etadd="modes.etadd"),
     ForEach(
-        of="bent", steps=(call("modal.row_answered", Y="bent.y", x="bent.x", etadd="modes.etadd"),)
+        of="bent",
+        steps=(call("modal.multiplier_acceleration", Y="bent.y", x="bent.x", etadd="modes.etadd"),),
     ),
     Copy(to="modes.udot", source="modes.etadd"),
     Add(to="modes.udot", source="modes.given", when="refined"),
@@ -256,7 +251,7 @@ _FACTOR_PORTS = {"H": "hinge.H_free", "G": "hinge.G"}
 _ROW_COUPLING = only(
     "moving",
     call("generic{free}.divide", F="hinge.F", y="pending.y", z="local.z"),
-    call("generic{free}.answered", y="hinge.g", z="local.z", l="pending.known"),
+    call("generic{free}.add_known_part", y="hinge.g", z="local.z", l="pending.known"),
     ForEach(
         of="before", steps=(call("generic{free}.couple", y="before.y", z="local.z", L_ij="pair.L"),)
     ),
@@ -265,23 +260,23 @@ _ROW_COUPLING = only(
 
 def _effort_remainder(load: str, effort: str, remainder: str) -> Call:
     """Remainder of an effort after a load, where the hinge's speeds are eliminated."""
-    return call("generic{free}.push", when="moving", Rc="identity", r="zero", H="hinge.H_free",
-                G="zero", e=load, tau=effort, y=remainder)  # fmt: skip
+    return call("generic{free}.column_load", when="moving", Rc="identity", r="zero",
+                H="hinge.H_free", G="zero", e=load, tau=effort, y=remainder)  # fmt: skip
 
 
 def _carry_load(when: str, load: str, effort: str, remainder: str, onward: str) -> tuple[Call, ...]:
     """Load carried to the parent; a hinge on the ground only computes its efforts."""
     ports = {"e": load, "tau": effort, "y": remainder}
     return (
-        call("generic{free}.push", when=f"{when} hung".strip(), **BODY, **_FACTOR_PORTS, **ports,
-             e_I=onward),
-        call("generic{free}.push_on_ground", when=f"{when} moving !hung".strip(),
+        call("generic{free}.column_load", when=f"{when} on_body".strip(), **BODY, **_FACTOR_PORTS,
+             **ports, e_I=onward),
+        call("generic{free}.ground_column_load", when=f"{when} moving !on_body".strip(),
              H="hinge.H_free", **ports),
     )  # fmt: skip
 
 
 #: Modal part of a column at an end of a flexible body.
-_MODAL_COLUMN = call("modal.row_felt", when="outward", H="section.H", K="pending.K",
+_MODAL_COLUMN = call("modal.modal_column", when="outward", H="section.H", K="pending.K",
                      K_f="pending.modes")  # fmt: skip
 
 _UNSTAGED_STEPS = only(
@@ -332,26 +327,26 @@ _STAGED_STEPS = only(
                 replace(BIAS_EFFORTS_TO_KNOWN, when="!corrected"),
             ),
             *ONWARD,
-            Add(to="pending.onward", source="local.e", when="hung"),
+            Add(to="pending.onward", source="local.e", when="on_body"),
             *_ROW_COUPLING,
         ),
     ),
 )
 
 
-CARRIED = Pass(
-    "carried", "body", "S, e and the columns of open rows carried across the hinge to the parent.",
+CONDENSE_WITH_ROWS = Pass(
+    "condense_with_rows", "body", "S, e and columns of open rows carried to the parent.",
     (
-        *only("modal", RunPass(whole=MODAL_CONDENSE), _ROWS_CONDENSED),
-        ForEach(of="closings", steps=(RunPass(whole=ROW_CLOSED),)),
+        *only("modal", RunPass(whole=MODAL_CONDENSE), _ROW_CONDENSATION),
+        ForEach(of="closings", steps=(RunPass(whole=ROW_ELIMINATION),)),
         *only("outward", PORT_ASSEMBLY),
         *FREE,
-        efforts_of("pending.told", "refined"),
+        efforts_of("pending.previous_x", "refined"),
         FREE_EFFORTS,
         *_UNSTAGED_STEPS,
         *_STAGED_STEPS,
     ),
-    order=TIPS_TO_ROOT, skip="aside",
+    order=TIPS_TO_ROOT, skip="omitted",
 )  # fmt: skip
 
 
@@ -360,64 +355,67 @@ def _multiplier_efforts(column: str, offset: str) -> ForEach:
     return ForEach(
         of="pending",
         steps=(
-            call("generic{free}.pull", when="moving", y=column, x="pending.x", y_0=offset),
-            call("loops.loaded", when="kept", K="pending.K", x="pending.x", e="body.e"),
+            call("generic{free}.add_multiplier_effort", when="moving", y=column, x="pending.x",
+                 y_0=offset),
+            call("loops.apply_multiplier", when="loads_read", K="pending.K", x="pending.x",
+                 e="body.e"),
         ),
-    )
+    )  # fmt: skip
 
 
-ANSWERED = Pass(
-    "answered", "body", "Accelerations of a hinge under the multipliers of its open rows.",
+RECOVER_WITH_ROWS = Pass(
+    "recover_with_rows", "body", "Accelerations of a hinge under the multipliers of its open rows.",
     (
         *only(
             "!staged",
             _multiplier_efforts("pending.y", "hinge.g"),
-            call("generic{free}.answer", **BODY, **_FACTOR_PORTS, F="hinge.F", y="hinge.g",
-                 delta_I="parent.delta", udot="hinge.rates", delta="body.delta"),
+            call("generic{free}.column_acceleration", **BODY, **_FACTOR_PORTS, F="hinge.F",
+                 y="hinge.g", delta_I="parent.delta", udot="hinge.rates", delta="body.delta"),
         ),
         *only("staged", _multiplier_efforts("pending.z", "hinge.z"), *RECOVERED),
-        efforts_of("pending.x", "kept"),
+        efforts_of("pending.x", "loads_read"),
         ScatterSpeeds(to="body.udot", free="hinge.rates", imposed="body.s", when="!refined"),
         *only(
             "refined",
             ScatterSpeeds(to="body.udot", free="hinge.rates"),
             Add(to="body.udot", source="body.s"),
         ),
-        Add(to="body.udot", source="body.chosen", when="staged !corrected"),
-        ForEach(of="openings", steps=(RunPass(whole=ROW_FOUND),)),
+        Add(to="body.udot", source="body.bias_offset", when="staged !corrected"),
+        ForEach(of="openings", steps=(RunPass(whole=ROW_MULTIPLIER),)),
         *only("modal", *_MODAL_SOLUTION),
         *only("section", *PORT_MOTION),
         # The elimination has overwritten H.
         RunPass(whole=HINGE_MOTION, when="!staged imposed balance"),
     ),
-    skip="aside",
+    skip="omitted",
 )  # fmt: skip
 
-CLOSURES_ANSWERED = Pass(
-    "closures_answered", "body", "Accelerations and load of a cut hinge.",
+CLOSURE_ACCELERATIONS = Pass(
+    "closure_accelerations", "body", "Accelerations and load of a cut hinge.",
     (
         Copy(to="body.udot", source="body.s"),
-        Add(to="body.udot", source="body.chosen", when="staged !corrected"),
+        Add(to="body.udot", source="body.bias_offset", when="staged !corrected"),
         EachSpeed(
             steps=(
-                call("loops.told", J_A="closure.J_A[6 * k]", J_B="closure.J_B[6 * k]",
+                call("loops.row_acceleration", J_A="closure.J_A[6 * k]", J_B="closure.J_B[6 * k]",
                      l="closure.l[k]", delta_A="parent.delta", delta_B="outboard.delta",
                      c="local.along"),
                 Add(to="body.udot[k]", source="local.along"),
             ),
         ),
-        ForEach(of="rows", when="refined", steps=(Add(to="line.x", source="line.told"),)),
+        ForEach(of="rows", when="refined", steps=(Add(to="line.x", source="line.previous_x"),)),
         *only(
-            "kept",
+            "loads_read",
             efforts_of_own("own.x", ""),
             Copy(to="body.e"),
             Copy(to="body.delta", when="staged"),  # a massless frame has no deviation
             EachSpeed(
-                steps=(call("loops.loaded", K="closure.W[6 * k]", x="body.tau[k]", e="body.e"),),
+                steps=(call("loops.apply_multiplier", K="closure.W[6 * k]", x="body.tau[k]",
+                            e="body.e"),),
             ),
             ForEach(
                 of="rows",
-                steps=(call("loops.act", J="closure.W[6 * c]", tau="line.x", e="body.e"),),
+                steps=(call("loops.apply_effort", J="closure.W[6 * c]", tau="line.x", e="body.e"),),
             ),
         ),
     ),

@@ -7,13 +7,13 @@ to the root resist.
 
 from __future__ import annotations
 
-from .forward_kinematics import FORWARD, HINGE_MOTION, PRESCRIBED
+from .forward_kinematics import FORWARD, HINGE_MOTION, PRESCRIBED_ACCELERATIONS
 from .inverse_dynamics import EFFORT_AND_TRANSPORT
 from .pass_steps import TIPS_TO_ROOT, Copy, Pass, Run, RunPass, Sweep, call
 from .riccati_sweep import BODY
 
-COMPOSED = Pass(
-    "composed", "body", "Inertia of a body and its outboard part, carried to the parent.",
+COMPOSITE_INERTIA = Pass(
+    "composite_inertia", "body", "Inertia of a body and its outboard part, carried to the parent.",
     (
         RunPass(whole=HINGE_MOTION, when="own"),
         Copy(to="body.tau"),
@@ -23,15 +23,15 @@ COMPOSED = Pass(
     order=TIPS_TO_ROOT, skip="idle",
 )  # fmt: skip
 
-EXERTED = Pass(
-    "exerted",
+OUTBOARD_LOAD = Pass(
+    "outboard_load",
     "body",
     "Load of the outboard part at the given accelerations of the hinge.",
-    (call("generic{nu}.exerted", S="body.S", H="hinge.H", udot="body.given", e="body.e"),),
+    (call("generic{nu}.required_load", S="body.S", H="hinge.H", udot="body.given", e="body.e"),),
 )
 
-FELT_BY = Pass(
-    "felt_by",
+HINGE_EFFORTS = Pass(
+    "hinge_efforts",
     "body",
     "Efforts of a load along the speeds of one hinge, and the load on the parent.",
     EFFORT_AND_TRANSPORT,
@@ -40,5 +40,5 @@ FELT_BY = Pass(
 COMPOSITION = Sweep(
     "composition",
     "Inertia of the outboard part of each hinge, all hinges at rest.",
-    (Run(whole=PRESCRIBED), Run(whole=FORWARD), Run(whole=COMPOSED)),
+    (Run(whole=PRESCRIBED_ACCELERATIONS), Run(whole=FORWARD), Run(whole=COMPOSITE_INERTIA)),
 )

@@ -32,30 +32,31 @@ COLUMN = Pass(
     ),
 )  # fmt: skip
 
-COLUMN_CARRIED = Pass(
-    "column_carried", "body", "Load of the right-hand side carried across the hinge to the parent.",
+COLUMN_BACKWARD = Pass(
+    "column_backward", "body", "Load of the right-hand side carried to the parent.",
     (
         *only("modal section", *MODAL_EFFORT),
-        *only("modal", call("modal.pushed", Gg="modes.gain", e="body.e", e_f="modes.e_f",
+        *only("modal", call("modal.column_load", Gg="modes.gain", e="body.e", e_f="modes.e_f",
                             e_c="local.e_c"),
               Copy(to="body.e", source="local.e_c")),
         *only("outward", *MODAL_EFFORT),
         FREE_EFFORTS,
-        call("generic{free}.push", **BODY, H="hinge.H_free", G="hinge.G", e="body.e",
+        call("generic{free}.column_load", **BODY, H="hinge.H_free", G="hinge.G", e="body.e",
              tau="hinge.tau_free", y="hinge.g", e_I="parent.e"),
     ),
     order=TIPS_TO_ROOT, skip="idle",
 )  # fmt: skip
 
-COLUMN_ANSWERED = Pass(
-    "column_answered", "body", "Accelerations due to the right-hand side.",
+COLUMN_FORWARD = Pass(
+    "column_forward", "body", "Accelerations due to the right-hand side.",
     (
-        call("generic{free}.answer", **BODY, H="hinge.H_free", F="hinge.F", G="hinge.G",
-             y="hinge.g", delta_I="parent.delta", udot="hinge.rates", delta="body.delta"),
+        call("generic{free}.column_acceleration", **BODY, H="hinge.H_free", F="hinge.F",
+             G="hinge.G", y="hinge.g", delta_I="parent.delta", udot="hinge.rates",
+             delta="body.delta"),
         ScatterSpeeds(to="body.answer", free="hinge.rates"),
-        *only("modal", call("modal.answer", S_ff="modes.S_ff", e_f="modes.e_f", Gg="modes.gain",
-                            delta_I="body.delta", y="modes.felt", etadd="modes.etadd",
-                            work="modes.work"),
+        *only("modal", call("modal.column_acceleration", S_ff="modes.S_ff", e_f="modes.e_f",
+                            Gg="modes.gain", delta_I="body.delta", y="modes.load_effort",
+                            etadd="modes.etadd", work="modes.work"),
               Copy(to="modes.answer", source="modes.etadd")),
         *only("section", *PORT_MOTION),
     ),

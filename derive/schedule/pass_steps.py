@@ -120,7 +120,7 @@ class ForEachDirection(Step):
     """Steps for every direction c of a body, or of the body that a law belongs to.
 
     The derivatives that the steps read are seeded along the direction.  `of`: "free", the
-    unknowns of a hinge; "felt", those that affect a law; "rates", only its speeds;
+    unknowns of a hinge; "law_inputs", those that affect a law; "rates", only its speeds;
     "coordinates", only its coordinates; "modes", the unknowns of a flexible body; "motion", the
     nine numbers of a motion, "spin" the first three; "place", the nine of a displacement,
     "turn" the first three; "law", the unknowns of the speeds that a law acts on.
@@ -166,13 +166,13 @@ class ByScrew(Step):
 class ChooseBias(Step):
     """Cancel the bias motion along free unit directions of H by the speeds' accelerations.
 
-    These accelerations are stored in `chosen`; deviations from them are recovered later, and
+    These accelerations are stored in `offset`; deviations from them are recovered later, and
     zeros fold.
     """
 
     subspace: str = ""
     motion: str = ""
-    chosen: str = ""
+    offset: str = ""
 
 
 @dataclass(frozen=True)

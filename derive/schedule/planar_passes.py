@@ -29,29 +29,31 @@ from .pass_steps import (
 LOAD = (0, 1, 5)
 #: Traits of such a scene, and of unobserved evaluations of accelerations.
 _TRAITS = {
-    **dict.fromkeys(("own", "free", "moving", "hinged", "known", "posed", "looped"), True),
+    **dict.fromkeys(("own", "free", "moving", "hinged", "known", "poses", "looped"), True),
     **dict.fromkeys(
         ("parts", "whole", "staged", "section", "outward", "modal", "imposed", "distance", "plane",
-         "rolling", "coupled", "soft", "corrected", "gaping", "placing", "slipping", "refined",
-         "inverse", "weightless", "balance", "kept", "unmoved", "linked", "driven", "flexible",
-         "couplings", "product", "qr"), False,
+         "rolling", "coupled", "soft", "corrected", "position_gap", "gap_closing", "refined", "qr",
+         "velocity_error", "inverse", "weightless", "balance", "loads_read", "immobile", "linked",
+         "driven", "flexible", "couplings", "product"), False,
     ),
 }  # fmt: skip
 #: Loops that are empty in such a scene.
 _EMPTY_LOOPS = ("own", "bent")
-#: Kernels with a planar form.
-_KERNELS = {
-    "hinge.forward", "body.inertia", "body.bias_load",
-    *(f"frames.{name}" for name in (
-        "pose", "velocity", "point", "turning", "end_frame", "applied_load",
-    )),
-    *(f"generic{{free}}.{name}" for name in (
-        "factor", "push", "push_on_ground", "answer", "divide", "couple", "answered", "pull",
-    )),
-    *(f"loops.{name}" for name in (
-        "meet", "slip", "drift", "row", "known", "told", "act", "close", "shed", "multiplier_more",
-    )),
+#: Kernels with a planar form, by their prefix in calls, and the element that has them.
+PLANAR_KERNELS = {
+    "hinge": (("hinge", "pin"), "forward"),
+    "body": (("body", "rigid"), "inertia bias_load"),
+    "frames": (("sweep", "frames"), "pose velocity point angular_motion end_frame applied_load"),
+    "generic{free}": (
+        ("sweep", "generic1"), "factor column_load ground_column_load column_acceleration divide "
+        "couple add_known_part add_multiplier_effort",
+    ),
+    "loops": (
+        ("sweep", "loops"), "relative_pose slip drift row known_parts row_acceleration "
+        "apply_effort eliminate_row update_column multiplier_of_motion",
+    ),
 }  # fmt: skip
+_KERNELS = {f"{key}.{name}" for key, (_, names) in PLANAR_KERNELS.items() for name in names.split()}
 #: Kernels of inertia, skipped for the massless frame of a cut hinge.
 _INERTIA_KERNELS = {"body.inertia", "body.bias_load"}
 #: Slots of free speeds -> slots of all speeds; rows of a hinge -> slots of the carried columns;
@@ -72,7 +74,7 @@ _CONSTANT_PORTS = {
 #: Slots that planar scenes read from records instead of writing them.
 _OMITTED_KERNELS = {"generic{nu}.complement", "frames.pivot_floor"}
 #: Rows have no target beyond the bodies' motion.
-_OMITTED_HOOKS = {"rows_asked"}
+_OMITTED_HOOKS = {"set_row_targets"}
 #: A pin has no prescribed motion.
 _ZERO_SLOT = "body.s"
 
@@ -84,7 +86,7 @@ def planar_sweep(whole: Sweep) -> Sweep:
     them.
     """
     runs = [run for run in _planar_steps(whole.runs) if isinstance(run, Run) and _is_needed(run)]
-    start, closures = _remove_run(runs, "rows_begun"), _remove_run(runs, "closures_in_plane")
+    start, closures = _remove_run(runs, "begin_rows"), _remove_run(runs, "closures_in_plane")
     first_load = next(k for k, run in enumerate(runs) if run.whole and run.whole.subject == "load")
     runs_in_order = (start, *runs[:first_load], closures, *runs[first_load:])
     return replace(whole, name=f"{whole.name}_in_plane", runs=runs_in_order)
@@ -129,7 +131,7 @@ def _planar_steps(steps: tuple[Step, ...]) -> Iterator[Step]:
             continue
         remaining = [word for word in step.when.split() if word.lstrip("!") not in _TRAITS]
         if isinstance(step, Call) and step.kernel in _INERTIA_KERNELS:
-            remaining.append("!aside")
+            remaining.append("!omitted")
         yield _planar_step(replace(step, when=" ".join(remaining)))
 
 

@@ -153,7 +153,7 @@ def _node(condition: str, subspace: str) -> Step:
 
 MODES_REDUCED = (
     _node("modal section placed", "section.H"),
-    _node("modal !section placed", "bend.still"),
+    _node("modal !section placed", "bend.zero_H"),
     *only("modal placed", Copy(to="place.S", source="local.S_p")),
 )
 _POSE_PORTS = {"Rc": "body.R", "r": "body.r"}
@@ -161,29 +161,29 @@ CARRY_TO_PARENT = call(
     "frames.placed_carry", when="placed", **_POSE_PORTS, **_ROW_PORTS, T_p="local.T_p",
     T_w="local.T", S_pI="inboard.place", S_wI="inboard.S",
 )  # fmt: skip
-PORT_ASSEMBLY = call("tangent.placed_absorb", n="modes", when="outward placed", **_POSE_PORTS,
+PORT_ASSEMBLY = call("tangent.placed_port", n="modes", when="outward placed", **_POSE_PORTS,
                 H="section.H", B_p="port.place_B", **_ROW_PORTS, T_p="local.T_p", K="bend.K",
                 Z_p="bend.place_Z", Z_x="bend.Z_x")  # fmt: skip
 
 # --- one right-hand side ------------------------------------------------------------------------
 
-KNOWN_LOAD = call("frames.placed_known", when="placed", **_ROW_PORTS, b_p="place.known",
-             e_S="local.seen", e_b="local.known")  # fmt: skip
-POSITION_CHANGE = call("frames.placed_moved", when="placed", **_POSE_PORTS, z_I=D + "parent.motion",
-             p_I="inboard.z", p="place.z")  # fmt: skip
+KNOWN_LOAD = call("frames.placed_known_load", when="placed", **_ROW_PORTS, b_p="place.known",
+             e_S="local.row_load", e_b="local.known")  # fmt: skip
+POSITION_CHANGE = call("frames.placed_displacement", when="placed", **_POSE_PORTS,
+                       z_I=D + "parent.motion", p_I="inboard.z", p="place.z")  # fmt: skip
 KNOWN_POSITION_CHANGE = Add(to="place.z", source="place.known")
 
 
 def _displacement_steps(size: str, b: str, unknowns: str) -> tuple[Step, ...]:
     return (
-        call("tangent.displaced", n=size, B=b, x=unknowns, z_c="place.z", z="local.p"),
+        call("tangent.port_motion", n=size, B=b, x=unknowns, z_c="place.z", z="local.p"),
         Copy(to="place.z", source="local.p"),
     )
 
 
 HINGE_REMAINDER = only(
     "moving placed",
-    call("tangent.placed_left", n="free", gain="place.gain", p="place.z", y="tangent.y"),
+    call("tangent.placed_remainder", n="free", gain="place.gain", p="place.z", y="tangent.y"),
 )
 HINGE_DISPLACED = only("moving placed", *_displacement_steps("free", "place.B", "local.x"))
 PORT_DISPLACED = only(
@@ -191,7 +191,7 @@ PORT_DISPLACED = only(
 )
 MODES_REMAINDER = only(
     "modal placed",
-    call("tangent.placed_left", n="modes", gain="bend.place_gain", p="place.z", y="bend.y"),
+    call("tangent.placed_remainder", n="modes", gain="bend.place_gain", p="place.z", y="bend.y"),
 )
 MODES_DISPLACED = only(
     "modal section placed", *_displacement_steps("modes", "bend.place_B", "modes.answer")

@@ -99,16 +99,16 @@ def eliminate_with_effort(effort: str, offset: str) -> tuple[Step, ...]:
 
 #: To the parent, unless it is the ground.
 ONWARD = (
-    transport("hinge", "hinge.d", when="hung !axial"),
-    transport("connection", "connection.r", when="hung"),
+    transport("hinge", "hinge.d", when="on_body !axial"),
+    transport("connection", "connection.r", when="on_body"),
 )
 PIVOT_CHECK = CheckPivots(
     pivots="local.pivots", subspace="hinge.H_free", own="body.own", whole="body.S",
     fails="undetermined", when="free",
 )  # fmt: skip
 ADD_TO_PARENT = (
-    Add(to="parent.S", source="local.S", when="hung"),
-    Add(to="parent.e", source="local.e", when="hung"),
+    Add(to="parent.S", source="local.S", when="on_body"),
+    Add(to="parent.e", source="local.e", when="on_body"),
 )
 _STAGED_STEPS = only(
     "staged",
@@ -168,7 +168,7 @@ RECOVER = Pass(
         ScatterSpeeds(to="body.udot", free="hinge.rates", imposed="body.s", when="parts !refined"),
         ScatterSpeeds(to="body.udot", free="hinge.rates", when="parts refined"),
         Add(to="body.udot", source="body.s", when="refined"),
-        Add(to="body.udot", source="body.chosen", when="staged"),
+        Add(to="body.udot", source="body.bias_offset", when="staged"),
         call("modal.recover", when="modal", Gg="modes.gain", delta_I="body.delta",
              etadd="modes.etadd"),
         Copy(to="modes.udot", source="modes.etadd", when="modal"),

@@ -42,7 +42,7 @@ v | 3 | velocity of P, own axes
 floor | 2 | least inertia along and about an axis above rounding
 s | nu | prescribed part of the accelerations
 tau | nu | efforts on the speeds
-chosen | nu | accelerations that cancel the bias motion along free directions
+bias_offset | nu | accelerations that cancel the bias motion along free directions
 own | 21 | S of the body alone
 U | 21 | rows of everything outboard, S = U^T U: the upper triangle
 d | 6 | load part of the rows, f = U^T (U a + d) + e
@@ -98,7 +98,7 @@ answer | n | modal accelerations, the solution
 K | n n | stiffness
 D | n n | damping
 S_rf | 6 n | frame rows, modal columns
-based | 6 n | S_rf relative to the supported section
+S_rf_I | 6 n | S_rf relative to the supported section
 A | 6 n | acceleration of second order by modal rates
 A_drag | 6 n | the same with the drag as density
 S_ff | n n | modal rows and columns
@@ -106,7 +106,7 @@ e_f | n | force part of the modal rows
 right | 7 n | right-hand sides of the modal elimination
 gain | 7 n | etadd = g - G a: columns of G, then -g
 work | n n | factor of S_ff
-felt | n | efforts on the modes by a load
+load_effort | n | efforts on the modes by a load
 """
 _SECTION = """
 Phi | 6 n | shapes at the section
@@ -159,7 +159,7 @@ side.inner | 6 | column of the current row, on the side of A
 side.outer | 6 | column of the current row, on the side of B
 line.known | 1 | known part of the current row
 line.x | 1 | its multiplier
-line.told | 1 | its multiplier in the previous solution
+line.previous_x | 1 | its multiplier in the previous solution
 line.softness | 1 | 1 / inertia of the rotor on it
 row.K | 6 | column on the body where the row closes
 row.known | 1 | known part
@@ -179,7 +179,7 @@ pending.y | free | -H^T K
 pending.z | free | diag(d)^-1 L^-1 y
 pending.known | 1 | its known part
 pending.x | 1 | its multiplier
-pending.told | 1 | its multiplier in the previous solution
+pending.previous_x | 1 | its multiplier in the previous solution
 pending.tau | nu | -C: efforts of a unit multiplier on the speeds of the hinge
 before.y | free | -H^T K of another open row
 pair.L | 1 | entry of L of both
@@ -188,10 +188,10 @@ own.inner | 6 | column of the coupling on the side of A
 own.outer | 6 | column of the coupling on the side of B
 own.known | 1 | its known part
 own.x | 1 | its multiplier
-own.told | 1 | its multiplier in the previous solution
+own.previous_x | 1 | its multiplier in the previous solution
 coupling.x | 1 | multiplier of a coupling
-coupling.still | 1 | rate at zero speeds, due to the prescribed value
-coupling.told | 1 | its multiplier in the previous solution
+coupling.time_rate | 1 | rate at zero speeds, due to the prescribed value
+coupling.previous_x | 1 | its multiplier in the previous solution
 pending.modes | n | its column on the modes of the body that an end belongs to
 bent.K | 6 | column of a row that passes or ends at a flexible body, on the frame
 bent.modes | n | column of this row on the modes
@@ -248,16 +248,16 @@ place.known | 9 | known displacement across the connection
 place.B | 9 nu | displacement along the free speeds, a row a speed
 place.gain | 9 nu | rows by the displacement, divided by those by the unknowns
 tangent.along | nq nu | change of the coordinates along the speeds, a row a speed
-tangent.turns | nq nq | derivatives of the rates by the coordinates, a row a coordinate
-tangent.ways | nq nu | derivatives of the rates by the speeds, a row a speed
+tangent.rates_by_coordinates | nq nq | derivatives of the rates by the coordinates, by rows
+tangent.rates_by_speeds | nq nu | derivatives of the rates by the speeds, a row a speed
 tangent.unit | nq nq | unit matrix
 tangent.rates | nq nq | sq 1 - kappa times the derivatives of the rates
-tangent.lag | nq nq | its inverse
-tangent.lag_work | nq nq | its factors
+tangent.Q | nq nq | its inverse
+tangent.Q_work | nq nq | its factors
 bend.B | 9 n | change of motion along the modes, a row a mode
 bend.G | 6 n | change of the carried load
 bend.W | n n | change of the rows by the carried load
-bend.still | 6 n | zero subspace of a frame that is supported by a hinge
+bend.zero_H | 6 n | zero subspace of a frame that is supported by a hinge
 bend.K | 6 n | own load along the modes
 bend.Z_z | 9 n | own rows by the motion, a row an entry
 bend.Z_x | n n | own rows by the modes, a row a mode
@@ -283,7 +283,7 @@ mass.F | nu nu | D = L diag(d) L^T: L, and 1 / d on the diagonal
 mass.G | 6 nu | D^-1 H^T S
 inboard.mass | 21 | mass.S of the parent
 shapes.S_rf | 6 n | frame rows, modal columns, of the mass matrix
-shapes.based | 6 n | shapes.S_rf relative to the supported section
+shapes.S_rf_I | 6 n | shapes.S_rf relative to the supported section
 shapes.S_ff | n n | modal rows and columns, including stiffness and damping
 shapes.right | 7 n | right-hand sides of the modal elimination
 shapes.gain | 7 n | etadd = g - G a: columns of G, then -g
@@ -331,9 +331,9 @@ TRAITS: dict[str, str] = {
     "special": "every speed is free and without rotor, and the hinge has its own elimination",
     "free": "some speed is free",
     "imposed": "some speed is prescribed, or locked until its release",
-    "hung": "the parent is a body, not the ground",
+    "on_body": "the parent is a body, not the ground",
     "link": "the connection is a screw about x, with a constant part of the hinge's own screw",
-    "turned": "the constant part of the screw includes a rotation",
+    "rotated": "the constant part of the screw includes a rotation",
     "idle": "an end without outboard bodies or loads that is not observed",
     "modal": "the floating frame of a flexible body",
     "section": "the connection passes a section of a flexible body",
@@ -354,38 +354,38 @@ TRAITS: dict[str, str] = {
     "linked": "consecutive links are swept as links",
     "laws": "the scene has hinge laws",
     "driven": "the scene has prescribed motion",
-    "valued": "efforts or loads are expressions",
+    "expressions": "efforts or loads are expressions",
     "flexible": "the scene has flexible bodies",
     "placed": "loads on the body or outboard of it depend only on its position",
     "own_load": "the load depends only on the position of its body",
     "from_body": "its end F is on a body, not on the ground",
     "to_body": "its end T is on a body, not on the ground",
     "own_force": "the element is between a body and the ground",
-    "posed": "loads or force elements need poses",
+    "poses": "loads or force elements need poses",
     "shifted": "some increments of a right-hand side are known",
-    "united": "the right-hand side contains a unit load",
+    "unit_load": "the right-hand side contains a unit load",
     "looped": "the scene has closed loops",
     "cut": "the hinge closes a loop",
-    "shut": "the hinge that a law acts on closes a loop",
+    "loop_hinge": "the hinge that a law acts on closes a loop",
     "hinged": "a hinge closes the loop: free and constrained directions make six",
     "distance": "the constraint keeps a distance",
     "plane": "the constraint keeps a point on a plane",
     "rolling": "the constraint is that of a rolling disc or ball",
-    "aside": "the hinge closes a loop, or the body is idle",
+    "omitted": "the hinge closes a loop, or the body is idle",
     "residual": "required efforts are requested with the multipliers of closed loops",
     "corrected": "a position gap or a velocity error is corrected",
     "soft": "the row is that of a rotor",
     "refined": "the residual of a previous solution is solved for, and added to it",
     "inside": "the row closes on a body, not at the ground, whose deviation is zero",
-    "unmoved": "the row has no inertia in any position: code for one scene omits it",
+    "immobile": "the row has no inertia in any position: code for one scene omits it",
     "couplings": "coordinates are coupled",
-    "unmet": "the coupling is redundant",
+    "redundant": "the coupling is redundant",
     "coupled": "the open row is a coupling of the hinge's speeds",
-    "placing": "accelerations close gaps within a step",
-    "gaping": "a position gap is corrected",
-    "slipping": "a velocity error is corrected",
+    "gap_closing": "accelerations close gaps within a step",
+    "position_gap": "a position gap is corrected",
+    "velocity_error": "a velocity error is corrected",
     "qr": "the least-squares sweep is used",
     "rigid": "the body is the built-in rigid one",
-    "kept": "S and e are read after the sweep",
+    "loads_read": "S and e are read after the sweep",
     "product": "the product of classical matrices is requested",
 }

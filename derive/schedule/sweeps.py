@@ -4,82 +4,82 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from .approximate_tangent import LAWS_ALONE, LAWS_SOLUTION, RATES_CHANGE
-from .couplings import COUPLINGS_ANSWERED, COUPLINGS_LOADED
+from .approximate_tangent import APPROXIMATE_SOLUTION, APPROXIMATE_TANGENT, RATES_CHANGE
+from .couplings import COUPLING_LOADS, COUPLING_MULTIPLIERS
 from .flexible import DRAG, MOMENTUM, SECTION_MOTION, STRAIN
-from .forward_kinematics import DRIVES, FORWARD, HINGE_MOTION, POSES, PRESCRIBED
-from .inverse_dynamics import REQUIRED
-from .iterative_refinement import RESTATED, RESTATED_OF_TREE
+from .forward_kinematics import DRIVES, FORWARD, HINGE_MOTION, POSES, PRESCRIBED_ACCELERATIONS
+from .inverse_dynamics import REQUIRED_EFFORTS
+from .iterative_refinement import ROTOR_RESIDUAL, ROTOR_RESIDUAL_OF_TREE
 from .links import LINK_CONDENSE, LINK_FORWARD, LINK_RECOVER, LINK_TURN
 from .loads import DRIVE_POWER, EFFORTS, EFFORTS_POWER, FORCES, LAWS, LOADS
 from .loop_closure import (
-    ANSWERED,
-    CARRIED,
+    CLEAR_LOADS,
+    CLOSURE_ACCELERATIONS,
+    CLOSURE_LOADS,
     CLOSURES,
-    CLOSURES_ANSWERED,
-    CLOSURES_LOADED,
-    ROW_CLOSED,
-    ROW_FOUND,
-    UNLOADED,
+    CONDENSE_WITH_ROWS,
+    RECOVER_WITH_ROWS,
+    ROW_ELIMINATION,
+    ROW_MULTIPLIER,
 )
-from .mass_matrix import COMPOSITION, EXERTED, FELT_BY
-from .mass_matrix_solve import COLUMN, COLUMN_ANSWERED, COLUMN_CARRIED, FACTORISE
+from .mass_matrix import COMPOSITION, HINGE_EFFORTS, OUTBOARD_LOAD
+from .mass_matrix_solve import COLUMN, COLUMN_BACKWARD, COLUMN_FORWARD, FACTORISE
 from .pass_steps import Pass, Run, Sweep
 from .planar_passes import planar_sweep
 from .qr_sweep import QR_CONDENSE, QR_OWN
 from .riccati_sweep import CONDENSE, RECOVER
 from .tangent_sweep import (
     APPLIED_SLOPE,
-    BROUGHT,
+    CONTRIBUTIONS,
+    COORDINATE_INCREMENT,
     DIRECTIONAL,
-    LAGGED,
     TANGENT,
-    TANGENT_BEYOND,
     TANGENT_SOLUTION,
+    TANGENT_WITH_INCREMENTS,
 )
 
-_GIVEN_RUNS = (
-    Run(whole=PRESCRIBED),
+_PRESCRIBED_RUNS = (
+    Run(whole=PRESCRIBED_ACCELERATIONS),
     Run(hook="drive_values", when="driven"),
     Run(whole=DRIVES, when="driven"),
-    Run(hook="expression_values", when="valued"),
+    Run(hook="expression_values", when="expressions"),
 )
-GIVEN = Sweep(
-    "given", "Driven coordinates, and the values of the scene's expressions.", _GIVEN_RUNS
+PRESCRIBED_VALUES = Sweep(
+    "prescribed_values", "Driven coordinates and values of expressions.", _PRESCRIBED_RUNS
 )
 _LOAD_RUNS = (
-    Run(whole=DRAG, when="posed flexible"),
-    Run(whole=LOADS, when="posed"),
-    Run(whole=FORCES, when="posed"),
+    Run(whole=DRAG, when="poses flexible"),
+    Run(whole=LOADS, when="poses"),
+    Run(whole=FORCES, when="poses"),
 )
 
 #: Closing of rows and computation of multipliers, in place of `condense` and `recover`.
 _CLOSURE_RUNS = (
-    Run(hook="rows_begun"),
+    Run(hook="begin_rows"),
     Run(whole=CLOSURES),
-    Run(hook="rows_asked"),
-    Run(whole=CARRIED),
-    Run(whole=ROW_CLOSED),
-    Run(whole=ROW_FOUND),
-    Run(whole=ANSWERED),
-    Run(whole=CLOSURES_ANSWERED),
+    Run(hook="set_row_targets"),
+    Run(whole=CONDENSE_WITH_ROWS),
+    Run(whole=ROW_ELIMINATION),
+    Run(whole=ROW_MULTIPLIER),
+    Run(whole=RECOVER_WITH_ROWS),
+    Run(whole=CLOSURE_ACCELERATIONS),
 )
 
 
 ACCELERATIONS = Sweep(
     "accelerations", "Rates of the coordinates and accelerations.",
     (
-        *_GIVEN_RUNS,
+        *_PRESCRIBED_RUNS,
         Run(hook="links_forward", when="linked"),
         Run(whole=FORWARD, when="!linked"),
         Run(whole=QR_OWN, when="qr"),
         Run(whole=EFFORTS_POWER, when="balance efforts"),
         Run(whole=EFFORTS),
         Run(whole=LAWS),
-        Run(whole=RESTATED, when="refined looped"),
-        Run(whole=RESTATED_OF_TREE, when="refined !looped"),
+        Run(whole=ROTOR_RESIDUAL, when="refined looped"),
+        Run(whole=ROTOR_RESIDUAL_OF_TREE, when="refined !looped"),
         Run(whole=STRAIN, when="balance flexible"),
-        Run(whole=POSES, when="posed"),
+        Run(whole=POSES, when="poses"),
         Run(hook="product_before_loads", when="product"),
         *_LOAD_RUNS,
         Run(hook="product", when="product"),
@@ -90,8 +90,8 @@ ACCELERATIONS = Sweep(
         Run(whole=RECOVER, when="!linked !looped"),
         *(replace(run, when="looped") for run in _CLOSURE_RUNS),
         Run(whole=DRIVE_POWER, when="balance"),
-        Run(whole=COUPLINGS_ANSWERED, when="couplings"),
-        Run(hook="product_compared", when="product"),
+        Run(whole=COUPLING_MULTIPLIERS, when="couplings"),
+        Run(hook="compare_product", when="product"),
     ),
 )  # fmt: skip
 
@@ -101,17 +101,17 @@ ACCELERATIONS_IN_PLANE = planar_sweep(ACCELERATIONS)
 INVERSE_DYNAMICS = Sweep(
     "inverse_dynamics", "Efforts required by given accelerations in addition to those of the laws.",
     (
-        *_GIVEN_RUNS,
+        *_PRESCRIBED_RUNS,
         Run(whole=FORWARD),
         Run(whole=EFFORTS),
         Run(whole=LAWS),
         Run(whole=STRAIN, when="balance flexible"),
-        Run(whole=POSES, when="posed"),
+        Run(whole=POSES, when="poses"),
         *_LOAD_RUNS,
-        Run(hook="couplings_valued", when="couplings residual"),
-        Run(whole=COUPLINGS_LOADED, when="couplings residual"),
-        Run(whole=CLOSURES_LOADED, when="looped residual"),
-        Run(whole=REQUIRED),
+        Run(hook="evaluate_couplings", when="couplings residual"),
+        Run(whole=COUPLING_LOADS, when="couplings residual"),
+        Run(whole=CLOSURE_LOADS, when="looped residual"),
+        Run(whole=REQUIRED_EFFORTS),
     ),
 )  # fmt: skip
 
@@ -120,13 +120,13 @@ CORRECTION = Sweep(
     "Smallest change, weighted by inertia, that removes position gaps or velocity errors of closed"
     " loops, and the contribution of an impact.",
     (
-        Run(whole=PRESCRIBED),
+        Run(whole=PRESCRIBED_ACCELERATIONS),
         Run(hook="drive_values", when="driven"),
         Run(whole=DRIVES, when="driven"),
         Run(whole=FORWARD),
         Run(whole=POSES),
-        Run(whole=UNLOADED),
-        Run(hook="struck"),
+        Run(whole=CLEAR_LOADS),
+        Run(hook="apply_impact"),
         Run(whole=CONDENSE, when="!looped"),
         Run(whole=RECOVER, when="!looped"),
         *(replace(run, when="looped") for run in _CLOSURE_RUNS),
@@ -135,28 +135,32 @@ CORRECTION = Sweep(
 
 MOTION = Sweep(
     "motion", "Poses and velocities of all bodies.",
-    (*_GIVEN_RUNS, Run(whole=FORWARD), Run(whole=POSES)),
+    (*_PRESCRIBED_RUNS, Run(whole=FORWARD), Run(whole=POSES)),
 )  # fmt: skip
-POSED = Sweep("posed", "Poses only, after a sweep.", (Run(whole=POSES),))
+POSES_ONLY = Sweep("poses_only", "Poses only, after a sweep.", (Run(whole=POSES),))
 
 FACTORISATION = Sweep(
     "factorisation",
     "The mass matrix of the tree factored, at rest and without loads.",
-    (Run(whole=PRESCRIBED), Run(whole=FORWARD), Run(whole=FACTORISE)),
+    (Run(whole=PRESCRIBED_ACCELERATIONS), Run(whole=FORWARD), Run(whole=FACTORISE)),
 )
 SOLUTION = Sweep(
     "solution",
     "One right-hand side: accelerations due to given efforts only.",
-    (Run(whole=COLUMN), Run(whole=COLUMN_CARRIED), Run(whole=COLUMN_ANSWERED)),
+    (Run(whole=COLUMN), Run(whole=COLUMN_BACKWARD), Run(whole=COLUMN_FORWARD)),
 )
 
-SWEEPS = (GIVEN, ACCELERATIONS, ACCELERATIONS_IN_PLANE, INVERSE_DYNAMICS, CORRECTION, MOTION,
-          POSED, FACTORISATION, SOLUTION, DIRECTIONAL, APPLIED_SLOPE, TANGENT, BROUGHT,
-          TANGENT_SOLUTION, TANGENT_BEYOND, LAWS_ALONE, LAWS_SOLUTION, COMPOSITION)  # fmt: skip
+SWEEPS = (
+    PRESCRIBED_VALUES, ACCELERATIONS, ACCELERATIONS_IN_PLANE, INVERSE_DYNAMICS, CORRECTION,
+    MOTION, POSES_ONLY, FACTORISATION, SOLUTION, DIRECTIONAL, APPLIED_SLOPE, TANGENT, CONTRIBUTIONS,
+    TANGENT_SOLUTION, TANGENT_WITH_INCREMENTS, APPROXIMATE_TANGENT, APPROXIMATE_SOLUTION,
+    COMPOSITION,
+)  # fmt: skip
 
 #: Passes that the looped engine's C runs for single subjects: links and bodies between runs of
 #: links, observations, paths to the root.
 SINGLY: tuple[Pass, ...] = (
-    FORWARD, CONDENSE, RECOVER, HINGE_MOTION, SECTION_MOTION, MOMENTUM, LAGGED, RATES_CHANGE,
-    EXERTED, FELT_BY, LINK_TURN, LINK_FORWARD, LINK_CONDENSE, LINK_RECOVER,
+    FORWARD, CONDENSE, RECOVER, HINGE_MOTION, SECTION_MOTION, MOMENTUM, COORDINATE_INCREMENT,
+    RATES_CHANGE, OUTBOARD_LOAD, HINGE_EFFORTS, LINK_TURN, LINK_FORWARD, LINK_CONDENSE,
+    LINK_RECOVER,
 )  # fmt: skip

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from . import position_dependent_loads
-from .couplings import COUPLINGS_LOADED
+from .couplings import COUPLING_LOADS
 from .differentiated_passes import (
     SLOPE,
     D,
@@ -29,11 +29,11 @@ from .forward_kinematics import (
     FORWARD,
     HINGE,
     POSES,
-    PRESCRIBED,
+    PRESCRIBED_ACCELERATIONS,
 )
-from .inverse_dynamics import REQUIRED
+from .inverse_dynamics import REQUIRED_EFFORTS
 from .loads import EFFORTS, FORCES, LAWS, LOADS
-from .loop_closure import CLOSURES_LOADED
+from .loop_closure import CLOSURE_LOADS
 from .pass_steps import (
     TIPS_TO_ROOT,
     Add,
@@ -86,23 +86,23 @@ def _skip_hinge_motion(whole: Pass) -> Pass:
 
 
 _MOTION_RUNS = (
-    Run(whole=differentiate_pass(PRESCRIBED)),
+    Run(whole=differentiate_pass(PRESCRIBED_ACCELERATIONS)),
     Run(hook="drive_slopes", when="driven"),
     Run(whole=differentiate_pass(DRIVES), when="driven"),
-    Run(hook="expression_slopes", when="valued"),
+    Run(hook="expression_slopes", when="expressions"),
     Run(whole=differentiate_pass(_FORWARD)),
 )
-_POSE_RUN = Run(whole=differentiate_pass(_skip_hinge_motion(POSES)), when="posed")
+_POSE_RUN = Run(whole=differentiate_pass(_skip_hinge_motion(POSES)), when="poses")
 _LOAD_RUNS = (
-    Run(whole=differentiate_pass(DRAG), when="posed flexible"),
-    Run(whole=differentiate_pass(LOADS), when="posed"),
-    Run(whole=differentiate_pass(FORCES), when="posed"),
+    Run(whole=differentiate_pass(DRAG), when="poses flexible"),
+    Run(whole=differentiate_pass(LOADS), when="poses"),
+    Run(whole=differentiate_pass(FORCES), when="poses"),
 )
 _COUPLING_RUNS = (
     Run(hook="coupling_slopes", when="couplings"),
-    Run(whole=differentiate_pass(COUPLINGS_LOADED), when="couplings"),
+    Run(whole=differentiate_pass(COUPLING_LOADS), when="couplings"),
 )
-_CLOSURE_RUN = Run(whole=differentiate_pass(_skip_hinge_motion(CLOSURES_LOADED)), when="looped")
+_CLOSURE_RUN = Run(whole=differentiate_pass(_skip_hinge_motion(CLOSURE_LOADS)), when="looped")
 DIRECTIONAL = Sweep(
     "required_slope", "Derivative of the efforts required by given accelerations.",
     (
@@ -113,7 +113,7 @@ DIRECTIONAL = Sweep(
         _POSE_RUN,
         *_LOAD_RUNS,
         _CLOSURE_RUN,
-        Run(whole=differentiate_pass(_skip_hinge_motion(REQUIRED))),
+        Run(whole=differentiate_pass(_skip_hinge_motion(REQUIRED_EFFORTS))),
     ),
 )  # fmt: skip
 
@@ -124,7 +124,7 @@ def _across_tree(whole: Pass, own: str) -> Run:
     """Derivative of a pass, limited to what the elimination does not include."""
     return Run(
         whole=replace(differentiate_pass(whole), name=f"{whole.name}_across", skip=own),
-        when="posed",
+        when="poses",
     )
 
 
@@ -137,14 +137,15 @@ APPLIED_SLOPE = Sweep(
     (
         *_MOTION_RUNS,
         _POSE_RUN,
-        Run(whole=_NO_LOADS, when="posed"),
+        Run(whole=_NO_LOADS, when="poses"),
         _across_tree(LOADS, "own_load"),
         _across_tree(FORCES, "own_force"),
         Run(whole=differentiate_pass(EFFORTS), when="looped"),
         *_COUPLING_RUNS,
         # Within the tree they are part of the elimination.
         Run(
-            whole=replace(differentiate_pass(LAWS), name="laws_across", skip="!shut"), when="looped"
+            whole=replace(differentiate_pass(LAWS), name="laws_across", skip="!loop_hinge"),
+            when="looped",
         ),
         _CLOSURE_RUN,
     ),
@@ -163,7 +164,7 @@ _DISPLACEMENT_PORTS = {"theta": "local.turn", "x": "local.shift"}
 
 def _displacement_call(change: Callable[[str], str]) -> Call:
     return call(
-        "frames.tangent_turned",
+        "frames.tangent_pose_change",
         R="hinge.R",
         d_R=change("R"),
         d_d=change("d"),
@@ -193,9 +194,9 @@ def _change_ports(change: Callable[[str], str]) -> dict[str, str]:
 
 
 def _mode_steps(b: str, g: str, b_p: str) -> tuple[Step, ...]:
-    """B, G and B_p along modes from derivatives of a section and, in d:modes.felt, of rows."""
+    """B, G and B_p along modes: derivatives of a section and, in d:modes.load_effort, of rows."""
     effort = call("modal.modal_effort", H="section.H", e="body.e", e_f="modes.e_f",
-                  tau="modes.felt")  # fmt: skip
+                  tau="modes.load_effort")  # fmt: skip
     return (
         RunPass(whole=differentiate_pass(SECTION_MOTION)),
         _displacement_call(_section_slot),
@@ -220,7 +221,7 @@ def _section_steps(matrices: str) -> tuple[Step, ...]:
                 *_mode_steps(
                     f"{matrices}.B[9 * c]", f"{matrices}.G[6 * c]", f"{matrices}.place_B[9 * c]"
                 ),
-                Move(to=f"{matrices}.W[n * c]", source=D + "modes.felt", count="n"),
+                Move(to=f"{matrices}.W[n * c]", source=D + "modes.load_effort", count="n"),
             ),
         ),
     )
@@ -234,10 +235,10 @@ def _hinge_steps(b: str, g: str, b_p: str, laws: str) -> tuple[Step, ...]:
         *only("!steady", *_LOCAL_CHANGE_STEPS),
         *only("steady curved", *_LOCAL_CHANGE_STEPS),
         *only("steady !curved placed", *_LOCAL_CHANGE_STEPS),
-        call("generic{nu}.tangent_along", when="!curved", H="hinge.H", d_q=D + "body.q",
+        call("generic{nu}.tangent_coordinate_change", when="!curved", H="hinge.H", d_q=D + "body.q",
              **_DISPLACEMENT_PORTS),
         replace(_displacement_call(_hinge_slot), when="curved"),
-        call("generic{nu}.tangent_turning", when="turning", **turning, d_u=D + "body.u"),
+        call("generic{nu}.tangent_rotational", when="turning", **turning, d_u=D + "body.u"),
         call("generic{nu}.tangent_steady", when="steady !turning", **column, d_u=D + "body.u"),
         call("generic{nu}.tangent_column", when="!steady", **column, **_change_ports(_hinge_slot)),
         position_dependent_loads.column(b_p, _hinge_slot("v")),
@@ -265,33 +266,35 @@ _HINGE = (
     ),
 )  # fmt: skip
 
-LAG = Pass(
-    "lag", "body", "Derivatives of the coordinates of a hinge by its speeds within a step.",
+INCREMENT_MATRIX = Pass(
+    "increment_matrix", "body", "Derivatives of a hinge's coordinates by its speeds within a step.",
     (
-        call("hinge.rates_by_coordinates", **COORDINATES, J="tangent.turns"),
-        call("hinge.rates_by_speeds", **COORDINATES, J="tangent.ways"),
+        call("hinge.rates_by_coordinates", **COORDINATES, J="tangent.rates_by_coordinates"),
+        call("hinge.rates_by_speeds", **COORDINATES, J="tangent.rates_by_speeds"),
         ForEachDirection(
             of="coordinates",
             steps=(Move(to="tangent.unit[nq * c]", source=D + "body.q", count="nq"),),
         ),
-        call("tangent.lag", n="nq", sq="step.q", kappa="step.kappa", one="tangent.unit",
-             g_q="tangent.turns", A="tangent.rates", Q="tangent.lag", work="tangent.lag_work"),
+        call("tangent.increment_matrix", n="nq", sq="step.q", kappa="step.kappa",
+             one="tangent.unit", g_q="tangent.rates_by_coordinates", A="tangent.rates",
+             Q="tangent.Q", work="tangent.Q_work"),
         ForEachDirection(
             of="rates",
             steps=(
-                call("tangent.lagged", n="nq", Q="tangent.lag", rate="tangent.ways[nq * c]",
-                     dq="tangent.along[nq * c]"),
+                call("tangent.coordinate_increment", n="nq", Q="tangent.Q",
+                     rate="tangent.rates_by_speeds[nq * c]", dq="tangent.along[nq * c]"),
             ),
         ),
     ),
 )  # fmt: skip
 
-LAGGED = Pass(
-    "lagged", "body", "Change of the coordinates of a hinge by that of its speeds.",
+COORDINATE_INCREMENT = Pass(
+    "coordinate_increment", "body", "Change of the coordinates of a hinge by that of its speeds.",
     (
         RunPass(whole=HINGE_CHANGE),
         Add(to=D + "body.qdot", source="body.rho"),
-        call("tangent.lagged", n="nq", Q="tangent.lag", rate=D + "body.qdot", dq="body.change"),
+        call("tangent.coordinate_increment", n="nq", Q="tangent.Q", rate=D + "body.qdot",
+             dq="body.change"),
     ),
 )  # fmt: skip
 
@@ -314,7 +317,7 @@ LAW_SLOPES = Pass(
     "Derivatives of a law along the unknowns of its hinge.",
     (
         ForEachDirection(
-            of="felt", steps=(*LAW_CHANGE, Add(to="law.slopes", source=D + "local.tau"))
+            of="law_inputs", steps=(*LAW_CHANGE, Add(to="law.slopes", source=D + "local.tau"))
         ),
     ),
 )
@@ -323,7 +326,7 @@ TANGENT_OWN = Pass(
     "tangent_own", "body", "Derivatives of a body's own load by its motion and its modes.",
     (
         Copy(to="tangent.laws", when="laws"),
-        RunPass(whole=LAG, when="curved"),
+        RunPass(whole=INCREMENT_MATRIX, when="curved"),
         *position_dependent_loads.BEGUN,
         call("body.load_by_motion", when="!modal", p="body.p", motion="body.motion",
              J="tangent.S"),
@@ -350,7 +353,7 @@ TANGENT_OWN = Pass(
         ),
         *position_dependent_loads.OWN_BY_PLACE,
         *only("modal !section", Copy(to="bend.B"), Copy(to="bend.G"), Copy(to="bend.W"),
-              Copy(to="bend.still")),
+              Copy(to="bend.zero_H")),
     ),
     skip="idle",
 )  # fmt: skip
@@ -374,7 +377,7 @@ _ELIMINATION_STEPS = (
     *position_dependent_loads.MODES_OWN_LOAD,
     call("tangent.node", n="modes", when="modal section", fails="tangent", H="section.H",
          **_NODE),
-    call("tangent.node", n="modes", when="modal !section", fails="tangent", H="bend.still",
+    call("tangent.node", n="modes", when="modal !section", fails="tangent", H="bend.zero_H",
          **_NODE),
     *only("modal", Copy(to="tangent.S", source="local.S_c")),
     *position_dependent_loads.MODES_REDUCED,
@@ -391,7 +394,7 @@ _ELIMINATION_STEPS = (
     *position_dependent_loads.HINGE_REDUCED,
     call("frames.tangent_carry", **_CARRY_PORTS, S="tangent.S", T="local.T", S_I="inboard.S"),
     position_dependent_loads.CARRY_TO_PARENT,
-    call("tangent.absorb", n="modes", when="outward", Rc="body.R", r="body.r", H="section.H",
+    call("tangent.assemble_port", n="modes", when="outward", Rc="body.R", r="body.r", H="section.H",
          B="port.B", G="port.G", W="port.W", S="tangent.S", T="local.T", K_x="port.K", **_OWN),
     position_dependent_loads.PORT_ASSEMBLY,
 )  # fmt: skip
@@ -399,33 +402,34 @@ _ELIMINATION_STEPS = (
 TANGENT_CONDENSE = Pass(
     "tangent_condense", "body", "Unknowns of a body eliminated, the rest carried to the parent.",
     (*_COLUMNS, *_ELIMINATION_STEPS),
-    order=TIPS_TO_ROOT, skip="aside",
+    order=TIPS_TO_ROOT, skip="omitted",
 )  # fmt: skip
 
 #: The same in two passes, for many tangents at one state: contributions are computed once.
-TANGENT_BROUGHT = Pass(
-    "tangent_brought", "body", "Contribution of a body to the elimination.", _COLUMNS, skip="aside"
-)
-TANGENT_ELIMINATED = replace(
-    TANGENT_CONDENSE, name="tangent_eliminated",
+TANGENT_CONTRIBUTIONS = Pass(
+    "tangent_contributions", "body", "Contribution of a body to the elimination.", _COLUMNS,
+    skip="omitted",
+)  # fmt: skip
+TANGENT_ELIMINATION = replace(
+    TANGENT_CONDENSE, name="tangent_elimination",
     purpose="Unknowns of a body eliminated from its contribution.", steps=_ELIMINATION_STEPS,
 )  # fmt: skip
 
 _CONTRIBUTION_RUNS = (
     Run(whole=TANGENT_OWN),
     Run(whole=LAW_SLOPES),
-    Run(whole=position_dependent_loads.LOADS_BY_PLACE, when="posed"),
-    Run(whole=position_dependent_loads.FORCES_BY_PLACE, when="posed"),
+    Run(whole=position_dependent_loads.LOADS_BY_PLACE, when="poses"),
+    Run(whole=position_dependent_loads.FORCES_BY_PLACE, when="poses"),
 )
 TANGENT = Sweep(
     "tangent",
     "Tangent of inverse dynamics factored, after inverse dynamics itself.",
     (*_CONTRIBUTION_RUNS, Run(whole=TANGENT_CONDENSE)),
 )
-BROUGHT = Sweep(
-    "tangent_brought",
+CONTRIBUTIONS = Sweep(
+    "tangent_contributions",
     "Contributions to the tangent before elimination, after inverse dynamics.",
-    (*_CONTRIBUTION_RUNS, Run(whole=TANGENT_BROUGHT)),
+    (*_CONTRIBUTION_RUNS, Run(whole=TANGENT_CONTRIBUTIONS)),
 )
 
 
@@ -433,8 +437,8 @@ BROUGHT = Sweep(
 
 _MODAL_EFFORT_CHANGE = (
     call("modal.modal_effort", H="section.H", e=D + "body.e", e_f=D + "modes.e_f",
-         tau=D + "modes.felt"),
-    Copy(to=D + "modes.e_f", source=D + "modes.felt"),
+         tau=D + "modes.load_effort"),
+    Copy(to=D + "modes.e_f", source=D + "modes.load_effort"),
 )  # fmt: skip
 
 _NO_LOAD = Copy(to=D + "body.e")
@@ -453,7 +457,7 @@ TANGENT_COLUMN = Pass(
 
 def _modal_load_steps(subspace: str) -> tuple[Step, ...]:
     return (
-        call("tangent.push", n="modes", H=subspace, V="bend.V", D="bend.D", e=D + "body.e",
+        call("tangent.column_load", n="modes", H=subspace, V="bend.V", D="bend.D", e=D + "body.e",
              e_f=D + "modes.e_f", rest="bend.rest", y="bend.y", e_c="local.e_c",
              work="bend.work"),
         Copy(to=D + "body.e", source="local.e_c"),
@@ -468,20 +472,20 @@ _LOAD_PORTS = {
 _LOAD_TRANSPORT = call("frames.transport", when="!moving", Rc="body.R", r="body.r", e=D + "body.e",
                        e_I=D + "parent.e")  # fmt: skip
 
-TANGENT_CARRIED = Pass(
-    "tangent_carried", "body", "Loads of a right-hand side carried to the parent.",
+TANGENT_BACKWARD = Pass(
+    "tangent_backward", "body", "Loads of a right-hand side carried to the parent.",
     (
         *only("modal section", *_modal_load_steps("section.H")),
-        *only("modal !section", *_modal_load_steps("bend.still")),
+        *only("modal !section", *_modal_load_steps("bend.zero_H")),
         *only("outward", *_MODAL_EFFORT_CHANGE),
         *only(
             "moving",
             SelectColumns(to="local.rows", source=D + "body.tau"),
-            call("generic{free}.tangent_push", **_LOAD_PORTS),
+            call("generic{free}.tangent_load", **_LOAD_PORTS),
         ),
         _LOAD_TRANSPORT,
     ),
-    order=TIPS_TO_ROOT, skip="aside",
+    order=TIPS_TO_ROOT, skip="omitted",
 )  # fmt: skip
 
 _STORE_MOTION = Copy(to=D + "body.motion", source="local.z")
@@ -498,16 +502,16 @@ _STORE_SOLUTION = ScatterSpeeds(to="body.answer", free="local.x")
 def _motion_with_modes(*known_steps: Step) -> tuple[Step, ...]:
     """Motion outboard of a body's own modes, or of those of the body that it is an end of."""
     return (
-        call("frames.tangent_moved", when="!moving", **_OUTBOARD_MOTION_PORTS),
+        call("frames.tangent_motion", when="!moving", **_OUTBOARD_MOTION_PORTS),
         *known_steps,
-        call("tangent.displaced", n="modes", when="outward", B="port.B", x="modes.answer",
+        call("tangent.port_motion", n="modes", when="outward", B="port.B", x="modes.answer",
              z_c=D + "body.motion", z="local.z"),
         *only("outward", _STORE_MOTION),
         *position_dependent_loads.PORT_DISPLACED,
         *position_dependent_loads.MODES_REMAINDER,
         *only(
             "modal",
-            call("tangent.answer", n="modes", B="bend.B", gain="bend.gain", y="bend.y",
+            call("tangent.column_solution", n="modes", B="bend.B", gain="bend.gain", y="bend.y",
                  z_c=D + "body.motion", x="modes.answer", z="local.z"),
             _STORE_MOTION,
         ),
@@ -515,17 +519,17 @@ def _motion_with_modes(*known_steps: Step) -> tuple[Step, ...]:
     )  # fmt: skip
 
 
-TANGENT_ANSWERED = Pass(
-    "tangent_answered", "body", "Solution for a right-hand side.",
+TANGENT_FORWARD = Pass(
+    "tangent_forward", "body", "Solution for a right-hand side.",
     (
         Copy(to="body.answer"),
         position_dependent_loads.POSITION_CHANGE,
         *position_dependent_loads.HINGE_REMAINDER,
-        *only("moving", call("generic{free}.tangent_answer", **_SOLUTION_PORTS), _STORE_SOLUTION),
+        *only("moving", call("generic{free}.tangent_solution", **_SOLUTION_PORTS), _STORE_SOLUTION),
         *position_dependent_loads.HINGE_DISPLACED,
         *_motion_with_modes(),
     ),
-    skip="aside",
+    skip="omitted",
 )  # fmt: skip
 
 TANGENT_SOLUTION = Sweep(
@@ -533,17 +537,17 @@ TANGENT_SOLUTION = Sweep(
     "One right-hand side solved with the factored tangent.",
     (
         Run(whole=TANGENT_COLUMN),
-        Run(hook="unit_load", when="united"),
-        Run(whole=TANGENT_CARRIED),
-        Run(whole=TANGENT_ANSWERED),
+        Run(hook="unit_load", when="unit_load"),
+        Run(whole=TANGENT_BACKWARD),
+        Run(whole=TANGENT_FORWARD),
     ),
 )
 
 
 # --- one right-hand side, and increments that are known -----------------------------------------
 
-KNOWN_COLUMN = Pass(
-    "known_column",
+INCREMENT_COLUMN = Pass(
+    "increment_column",
     "body",
     "A right-hand side, with own loads due to known modal increments.",
     (
@@ -560,54 +564,55 @@ KNOWN_COLUMN = Pass(
     ),
 )
 
-KNOWN_LAWS = Pass(
-    "known_laws", "law", "Change of the efforts of a law due to known increments of its hinge.",
+INCREMENT_LAWS = Pass(
+    "increment_laws", "law", "Change of the efforts of a law due to known increments of its hinge.",
     (*LAW_CHANGE, Add(to=D + "law.tau", source=D + "local.tau")),
 )  # fmt: skip
 
-_KNOWN = call("frames.tangent_known", S="tangent.S", b="tangent.known", g="local.turned",
-              e_S="local.seen", e_b="local.known")  # fmt: skip
+_KNOWN = call("frames.tangent_known_load", S="tangent.S", b="tangent.known", g="local.G",
+              e_S="local.row_load", e_b="local.known")  # fmt: skip
 _KNOWN_ROWS = (
-    *_mode_steps("tangent.known", "local.turned", "place.known"),
-    Copy(to=D + "modes.e_f", source=D + "modes.felt"),
+    *_mode_steps("tangent.known", "local.G", "place.known"),
+    Copy(to=D + "modes.e_f", source=D + "modes.load_effort"),
 )
 _KNOWN_LOAD = Add(to=D + "body.e", source="local.known")
 
 #: Rows of a hinge: carried load by the known increments, less the right-hand side and the change of
-#: laws, which KNOWN_COLUMN and KNOWN_LAWS add.
-KNOWN_CARRIED = Pass(
-    "known_carried", "body", "The same loads carried to the parent, with known increments.",
+#: laws, which INCREMENT_COLUMN and INCREMENT_LAWS add.
+INCREMENT_BACKWARD = Pass(
+    "increment_backward", "body", "The same loads carried to the parent, with known increments.",
     (
         *only("section", _CARRIER, *_KNOWN_ROWS),
         *only("modal section", *_modal_load_steps("section.H")),
-        *only("modal !section", *_modal_load_steps("bend.still")),
+        *only("modal !section", *_modal_load_steps("bend.zero_H")),
         *only("section", _KNOWN, position_dependent_loads.KNOWN_LOAD),
-        *only("outward", Add(to=D + "body.e", source="local.seen"), *_MODAL_EFFORT_CHANGE,
-              Add(to=D + "body.e", source="local.turned")),
+        *only("outward", Add(to=D + "body.e", source="local.row_load"), *_MODAL_EFFORT_CHANGE,
+              Add(to=D + "body.e", source="local.G")),
         *only("modal section", _KNOWN_LOAD),
         *only(
             "moving",
             _CARRIER,
-            *_hinge_steps("tangent.known", "local.turned", "place.known", D + "body.tau"),
+            *_hinge_steps("tangent.known", "local.G", "place.known", D + "body.tau"),
             SelectColumns(to="local.rows", source="local.change"),
             _KNOWN,
             position_dependent_loads.KNOWN_LOAD,
-            call("generic{free}.tangent_push_known", **_LOAD_PORTS, e_b="local.known"),
+            call("generic{free}.tangent_load_with_increments", **_LOAD_PORTS, e_b="local.known"),
         ),
         _LOAD_TRANSPORT,
     ),
-    order=TIPS_TO_ROOT, skip="aside",
+    order=TIPS_TO_ROOT, skip="omitted",
 )  # fmt: skip
 
-KNOWN_ANSWERED = Pass(
-    "known_answered", "body", "Solution for a right-hand side with known increments.",
+INCREMENT_FORWARD = Pass(
+    "increment_forward", "body", "Solution for a right-hand side with known increments.",
     (
         Copy(to="body.answer"),
         position_dependent_loads.POSITION_CHANGE,
         *only("moving placed", position_dependent_loads.KNOWN_POSITION_CHANGE),
         *position_dependent_loads.HINGE_REMAINDER,
         *only("moving",
-              call("generic{free}.tangent_answer_known", **_SOLUTION_PORTS, b="tangent.known"),
+              call("generic{free}.tangent_solution_with_increments", **_SOLUTION_PORTS,
+                   b="tangent.known"),
               _STORE_SOLUTION),
         *position_dependent_loads.HINGE_DISPLACED,
         *_motion_with_modes(
@@ -615,16 +620,16 @@ KNOWN_ANSWERED = Pass(
             *only("section placed", position_dependent_loads.KNOWN_POSITION_CHANGE),
         ),
     ),
-    skip="aside",
+    skip="omitted",
 )  # fmt: skip
 
-TANGENT_BEYOND = Sweep(
-    "tangent_beyond",
+TANGENT_WITH_INCREMENTS = Sweep(
+    "tangent_with_increments",
     "One right-hand side solved with the factored tangent and known increments.",
     (
-        Run(whole=KNOWN_COLUMN),
-        Run(whole=KNOWN_LAWS),
-        Run(whole=KNOWN_CARRIED),
-        Run(whole=KNOWN_ANSWERED),
+        Run(whole=INCREMENT_COLUMN),
+        Run(whole=INCREMENT_LAWS),
+        Run(whole=INCREMENT_BACKWARD),
+        Run(whole=INCREMENT_FORWARD),
     ),
 )

@@ -119,12 +119,12 @@ def _exponent_text(node: Node) -> str:
     return _RAISED.get(text, f"^{text}" if len(text) == 1 else f"^({text})")
 
 
-def _fence_box(mark: str, beside: Box) -> Box:
-    if len(beside.lines) == 1:
+def _fence_box(mark: str, content: Box) -> Box:
+    if len(content.lines) == 1:
         return Box((mark,))
     parts = {"(": "⎛⎜⎝", ")": "⎞⎟⎠", "|": "│││"}.get(mark, mark * 3)
-    count = len(beside.lines) - 2
-    return Box((parts[0], *[parts[1]] * count, parts[2]), beside.baseline)
+    count = len(content.lines) - 2
+    return Box((parts[0], *[parts[1]] * count, parts[2]), content.baseline)
 
 
 def _join_boxes(boxes: list[Box]) -> Box:

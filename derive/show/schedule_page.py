@@ -198,7 +198,7 @@ class _StepWriter:
 #: Texts of directions, numbered c.
 _DIRECTION_TEXTS = {
     "free": "every free speed c of the hinge, with its dependent changes in a step",
-    "felt": "every free speed c of the hinge that affects the law",
+    "law_inputs": "every free speed c of the hinge that affects the law",
     "rates": "every speed c of the hinge alone",
     "coordinates": "every coordinate c of the hinge alone",
     "law": "every unknown c of a speed of the law",
@@ -247,7 +247,7 @@ _STEP_TEXTS: dict[type, Callable[..., str]] = {
     Gather: lambda s: f"{s.to} = expression values at {s.places}",
     Evaluate: lambda s: f"{s.to} = expression {s.expression}",
     ChooseBias: lambda s: (
-        f"{s.motion} cancelled along free unit columns of {s.subspace} by {s.chosen}"
+        f"{s.motion} cancelled along free unit columns of {s.subspace} by {s.offset}"
     ),
     CheckPivots: lambda s: (
         f"{s.pivots} must exceed the rounding of {s.own}, or of {s.whole}  (fails: {s.fails})"

@@ -71,8 +71,8 @@ typedef struct {{
     int (*required)({_GIVEN}, double *efforts);
     int (*mass)({_GIVEN}, double *M);
     /* A point of one body; see derive/fuse/point_kinematics.py. */
-    int (*placed)({_END}, double *place, double *axes);
-    int (*moving)({_END}, double *velocity);
+    int (*pose)({_END}, double *place, double *axes);
+    int (*velocities)({_END}, double *velocity);
     int (*jacobian)({_END}, double *J);
     int (*jacobian_rate)({_END}, double *J);
     /* The slopes of the residual about a state; see derive/fuse/linearisation.py. */

@@ -160,10 +160,10 @@ def _certificate_data(result: Result) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def verdict_lines(verdict: Verdict, width: int, told: bool = True) -> list[str]:
-    """Verdict, wrapped to the width of the terminal; `told`: its reasons are printed too."""
+def verdict_lines(verdict: Verdict, width: int, has_reasons: bool = True) -> list[str]:
+    """Verdict, wrapped to the width of the terminal; `has_reasons`: its reasons are printed too."""
     text = str(verdict).replace("certify=True", "--certify")
-    return textwrap.wrap(text if told else text.replace(", see below", ""), max(width, 40))
+    return textwrap.wrap(text if has_reasons else text.replace(", see below", ""), max(width, 40))
 
 
 def certificate_lines(result: Result, width: int) -> list[str]:

@@ -59,11 +59,11 @@ class Graph(Terms):
         size_symbol: str | None = None,
         purpose: str = "",
         sources: Iterable[str] = (),
-        as_made: bool = False,
+        keep_order: bool = False,
     ) -> KernelIR:
         """Build a frozen kernel from the terms that the outputs need (others are dropped).
 
-        With `as_made` values keep the order of their creation, each guard and store right after
+        With `keep_order` values stay in the order of creation, each guard and store right after
         its operands (kernels without run-time size).  Otherwise they are ordered by the first
         guard or output that needs them.
 
@@ -72,9 +72,9 @@ class Graph(Terms):
         `LOOP_INDEX` (for a second such axis `INNER_INDEX`), holds for all k < n.
         """
         writer = Writer(self)
-        if as_made:
+        if keep_order:
             guards = [r for r in self._requests if isinstance(r, GuardRequest)]
-            writer.as_made(guards, outputs, values)
+            writer.emit_in_creation_order(guards, outputs, values)
             return KernelIR(
                 name, tuple(inputs), tuple(outputs), tuple(writer.statements), None, purpose,
                 tuple(sources),

@@ -174,7 +174,7 @@ class RowStructure:
 
 
 #: Numbers of a coupling, in this order; -C of each of its hinges follows.
-COUPLING_NUMBERS = ("drift", "gap", "slip", "still")
+COUPLING_NUMBERS = ("drift", "gap", "slip", "time_rate")
 
 
 @dataclass(frozen=True)

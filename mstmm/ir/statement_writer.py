@@ -82,7 +82,7 @@ class Writer:
             condition = self.operand(request.condition)
             self.statements.append(Guard(condition, request.code, request.message))
 
-    def as_made(
+    def emit_in_creation_order(
         self, guards: Iterable[GuardRequest], outputs: Iterable[Port], values: dict[str, object]
     ) -> None:
         """Emit all statements in the order in which the nodes were created."""

@@ -169,7 +169,7 @@ class _ChartBuilder:
         return Chart(
             title, request.t_end, len(self.times.times), reference, points_with_bounds,
             tuple(self.model_levels), (*self.skipped, *surveyed.skipped), request.error,
-            request.budget, self.budget.elapsed, self.times.description,
+            request.budget, self.budget.elapsed_time, self.times.description,
             (*scene_warnings(richest.scene), *common_warnings),
         )  # fmt: skip
 

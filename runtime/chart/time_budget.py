@@ -34,13 +34,13 @@ class Budget:
         self._begin = self.clock()
 
     @property
-    def elapsed(self) -> float:
+    def elapsed_time(self) -> float:
         """Time since the creation, s."""
         return self.clock() - self._begin
 
     def remaining(self, part: float = ALL) -> float:
         """Time until this fraction of the budget is spent, s, 0 or more."""
-        return max(0.0, part * self.seconds - self.elapsed)
+        return max(0.0, part * self.seconds - self.elapsed_time)
 
     def run_limit(self, part: float, waiting: int = 1) -> float:
         """Time limit of the next run, s, while `waiting` curves are not finished."""

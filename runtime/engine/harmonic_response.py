@@ -59,7 +59,7 @@ class HarmonicResponse:
             self._stiffer.residual(t, q, u, a)
             record.stiffer = self._stiffer.record
         self._arrays = {
-            "brought": _aligned_zeros(3 * count),
+            "contributions": _aligned_zeros(3 * count),
             "numbers": _aligned_zeros(lane_doubles * count),
             "workspace": _aligned_zeros(lane_doubles * engine.packed.workspace),
             "vectors": _aligned_zeros(lane_doubles * 2 * nu),
@@ -110,7 +110,7 @@ class HarmonicResponse:
 
     def omit_damping(self) -> None:
         """Omit the terms linear in s in subsequent calls."""
-        self._arrays["brought"][: len(self.tangent.numbers)] = 0.0
+        self._arrays["contributions"][: len(self.tangent.numbers)] = 0.0
 
     def count_negative(self, squares: Array) -> Integers:
         """Number of negative pivots of a symmetric Z at every s^2 (k,) < 0; -1 for a zero pivot.

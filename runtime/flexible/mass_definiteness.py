@@ -164,7 +164,7 @@ def _frame_twist(held: ModalPort, eta: Array) -> tuple[Array, Array]:
     inputs = section_inputs(held)
     section = evaluate(kernel("section"), {**inputs, "eta": eta, "etad": 0 * eta}, eta.shape[1])
     section_outputs = {name: section[name] for name in ("x", "Psi", "xd", "Psid", "xdd", "Psidd")}
-    inward = evaluate(kernel("inward"), {**section_outputs, "R_end": held.rotation})
+    inward = evaluate(kernel("frame_motion"), {**section_outputs, "R_end": held.rotation})
     return _twist_transform(inward["R"], inward["d"]), inward["H6"] @ section["Phi"]
 
 

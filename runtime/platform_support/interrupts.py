@@ -20,7 +20,7 @@ class Interrupt:
     def __init__(self) -> None:
         self.heard, self._came = False, False
 
-    def received(self) -> None:
+    def record(self) -> None:
         """Record that a signal has arrived."""
         self._came = True
 
@@ -44,25 +44,25 @@ class record_interrupts:
     """
 
     def __enter__(self) -> Interrupt:
-        self._told, self._came, self._since = Interrupt(), 0, 0.0
+        self._flag, self._came, self._since = Interrupt(), 0, 0.0
         self._before: list[tuple[signal.Signals, Any]] = []
         self._here = threading.get_ident() == threading.main_thread().ident
         if self._here:
             if not _open_flags:  # else the handler of the outermost block sets all flags
                 self._handle()
-            _open_flags.append(self._told)
-        return self._told
+            _open_flags.append(self._flag)
+        return self._flag
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         if not self._here:
             return
         _open_flags.pop()  # before a signal can be an exception again
         if _open_flags:
-            _open_flags[0].heard = _open_flags[0].heard or self._told.heard
+            _open_flags[0].heard = _open_flags[0].heard or self._flag.heard
             return
         self._restore()
         is_handled = kind is not None and issubclass(kind, KeyboardInterrupt)
-        if self._came and not (self._told.heard or is_handled):
+        if self._came and not (self._flag.heard or is_handled):
             signal.raise_signal(self._came)
 
     def _handle(self) -> None:
@@ -82,8 +82,8 @@ class record_interrupts:
 
     def _note(self, which: int, _: object) -> None:
         self._came = which
-        for flag in (self._told, *_open_flags):
-            flag.received()
+        for flag in (self._flag, *_open_flags):
+            flag.record()
         if not self._since:
             self._since = time.monotonic()
         elif time.monotonic() - self._since > MAX_INTERRUPT_DELAY:

@@ -83,12 +83,12 @@ class Observations:
         """Force (n, 3) (first 0) or moment (3) of a hinge."""
         observations, hinge_index = self, self.engine.packed.hinge_position.get(hinge)
         if hinge_index is None:  # the hinge welds bodies packed as one
-            observations = self.unmerged
+            observations = self.unmerged_observations
             hinge_index = observations.engine.packed.hinge_position[hinge]
         return observations.columns("loads", (hinge_index, slice(first, first + 3)))
 
     @cached_property
-    def unmerged(self) -> Observations:
+    def unmerged_observations(self) -> Observations:
         """Observations by the engine that packs every body separately."""
         result = Observations(self._model, self.run)
         result.engine = self._model.unmerged_engine

@@ -156,7 +156,7 @@ def recover(motion: HingeMotion) -> Derivation:
     rates = Quantity(symbol("udot", nu), "", "accelerations of the free coordinates")
     carried, factor, v = symbol("delta_Q", 6), symbol("F", nu, nu), symbol("v", nu)
     z_linear = sp.ImmutableDenseMatrix(nu, 3, lambda i, j: gain.symbol[i, j])
-    kept = sp.ImmutableDenseMatrix(nu, nu, lambda i, j: gain.symbol[i, 3 + j])
+    factor_entries = sp.ImmutableDenseMatrix(nu, nu, lambda i, j: gain.symbol[i, 3 + j])
     return Derivation(
         motion.hinge.name,
         f"accelerations of a rigid body outboard of the {motion.hinge.title}",
@@ -165,7 +165,7 @@ def recover(motion: HingeMotion) -> Derivation:
         (
             *_parent_transform(),
             Equation("X delta_I", carried, outboard_deviation()),
-            Equation("F", factor, kept),
+            Equation("F", factor, factor_entries),
             Equation(
                 "v = L^-T (z - Z X delta_I)",
                 v,

@@ -27,8 +27,8 @@ def balance(kernel: KernelIR) -> KernelIR:
 class BalancedKernels(Mapping[str, KernelIR]):
     """Kernels with regrouped sums, each computed on first access."""
 
-    def __init__(self, *made: KernelIR) -> None:
-        self._originals = {kernel.name: kernel for kernel in made}
+    def __init__(self, *kernels: KernelIR) -> None:
+        self._originals = {kernel.name: kernel for kernel in kernels}
         self._balanced: dict[str, KernelIR] = {}
 
     def __getitem__(self, name: str) -> KernelIR:

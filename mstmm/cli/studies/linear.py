@@ -287,7 +287,7 @@ def _print_assessment(answer: AssessedResult) -> None:
     """Print the verdict on an answer and its warnings."""
     from .. import terminal_output as terminal
 
-    terminal.print_lines(answer.verdict)
+    terminal.print_lines(answer.verdict())
     for text in answer.warnings:
         terminal.print_note(f"warning: {text}")
 

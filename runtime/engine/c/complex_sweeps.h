@@ -27,7 +27,7 @@ static inline void inertia_sizes(const mstmm_complex *S, mstmm_lanes *sizes)
 static void write_contributions(const mstmm_response *of, const mstmm_lanes_at *with, int64_t first,
                                 int64_t end, mstmm_complex *to)
 {
-    const real *by_rate = of->brought, *by_square = by_rate + of->n_numbers;
+    const real *by_rate = of->contributions, *by_square = by_rate + of->n_numbers;
     const real *lost = by_square + of->n_numbers;
     const mstmm_complex s = with->s, square = with->square;
     for (int64_t k = first; k < end; k++, to++) {
@@ -117,9 +117,9 @@ static void keep_pivots(const mstmm_response *of, const mstmm_lanes_at *with, in
 #define MSTMM_COMPLEX_AHEAD 2
 
 /* Prefetches the numbers of a body for a sweep: contributions common to all frequencies, if
- * `brought`, results of the elimination, loads and motions. */
+ * `with_contributions`, results of the elimination, loads and motions. */
 static inline void prefetch_body(const mstmm_response *of, const mstmm_lanes_at *with, int index,
-                                 int brought)
+                                 int with_contributions)
 {
     const mstmm_model *model = of->at->model;
     if (index < 0 || index >= model->n_bodies) return;
@@ -128,11 +128,11 @@ static inline void prefetch_body(const mstmm_response *of, const mstmm_lanes_at 
     const int64_t own = body->tangent, kept = own + MSTMM_TANGENT_B(nu, body->nq);
     const mstmm_complex *numbers = with->tangents.numbers;
     mstmm_fetch(numbers + kept, numbers + own + MSTMM_TANGENT_KNOWN(nu, body->nq));
-    if (brought) {
+    if (with_contributions) {
         const int64_t end = own + MSTMM_TANGENT_V(nu, body->nq);
         mstmm_fetch(with->tangents.held + own, with->tangents.held + end);
         for (int k = 0; k < 2; k++) {
-            const real *from = of->brought + k * of->n_numbers;
+            const real *from = of->contributions + k * of->n_numbers;
             mstmm_fetch(from + own, from + end);
         }
     } else {
@@ -165,7 +165,7 @@ static int eliminate(mstmm_response *of, mstmm_lanes_at *with)
         }
         mstmm_lanes before[2], after[2];
         inertia_sizes(S, before);
-        const int code = mstmm_complex_at_tangent_eliminated(&with->state, i);
+        const int code = mstmm_complex_at_tangent_elimination(&with->state, i);
         if (code) return code;
         inertia_sizes(S, after);
         for (int k = 0; k < 2; k++) {
@@ -197,11 +197,11 @@ static int solve_tree_in_lanes(const mstmm_response *of, mstmm_lanes_at *with,
         if (far) prefetch_body(of, with, i - ahead, 0);
         for (; !code && begun > least; begun--)
             code = mstmm_complex_at_tangent_column(state, begun - 1);
-        if (!code) code = mstmm_complex_at_tangent_carried(state, i);
+        if (!code) code = mstmm_complex_at_tangent_backward(state, i);
     }
     for (int i = 0; !code && i < n; i++) {
         if (far) prefetch_body(of, with, i + ahead, 0);
-        code = mstmm_complex_at_tangent_answered(state, i);
+        code = mstmm_complex_at_tangent_forward(state, i);
     }
     return code;
 }

@@ -14,7 +14,7 @@ static int known_number_index(const mstmm_state *state)
     return state->level == MSTMM_SLIP ? MSTMM_COUPLING_SLIP : MSTMM_COUPLING_DRIFT;
 }
 
-int mstmm_hook_couplings_valued(mstmm_state *state)
+int mstmm_hook_evaluate_couplings(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     real *loops = loop_numbers(state);

@@ -43,13 +43,13 @@ static inline void mstmm_aim_unknown(mstmm_state *state, const mstmm_body *body,
     } else {
         const real *along =
             step->numbers + body->tangent + MSTMM_TANGENT_ALONG(body->nu, body->nq) + j * body->nq;
-        const real share = step->laws_alone ? 1 / step->sq : 1;
+        const real share = step->approximate ? 1 / step->sq : 1;
         for (int i = 0; i < body->nq; i++) q[i] = share * along[i];
     }
 }
 
 /* True if a law does not depend on an unknown because it acts on another coordinate. */
-static inline int mstmm_unfelt(const mstmm_body *body, const mstmm_law *law, int j)
+static inline int mstmm_law_ignores(const mstmm_body *body, const mstmm_law *law, int j)
 {
     return law->kind == 0 && body->straight && j != law->speed;
 }

@@ -26,7 +26,7 @@ int mstmm_compiled_points_places(const void *record, real none, const real *cons
     int failed = !has_finite_state(points, q, still);
     (void)none;
     for (int i = 0; !failed && i < points->n_probes; i++)
-        failed = points->codes[i]->placed(GIVEN(points, q, still, i), answers[0] + 3 * i, axes);
+        failed = points->codes[i]->pose(GIVEN(points, q, still, i), answers[0] + 3 * i, axes);
     return failed;
 }
 
@@ -40,7 +40,7 @@ int mstmm_compiled_points_poses(const void *record, real none, const real *const
     (void)none;
     for (int i = 0; !failed && i < points->n_probes; i++) {
         real *pose = answers[0] + 16 * i;
-        failed = points->codes[i]->placed(GIVEN(points, q, still, i), place, axes);
+        failed = points->codes[i]->pose(GIVEN(points, q, still, i), place, axes);
         for (int row = 0; row < 3; row++) {
             memcpy(pose + 4 * row, axes + 3 * row, 3 * sizeof(real));
             pose[4 * row + 3] = place[row];
@@ -56,7 +56,7 @@ typedef int kernel(const double *p, const double *t, const double *q, const doub
                    const double *memory, const double *end, double *answer);
 typedef kernel *chosen(const mstmm_fused *code);
 
-static kernel *motion_kernel(const mstmm_fused *code) { return code->moving; }
+static kernel *motion_kernel(const mstmm_fused *code) { return code->velocities; }
 static kernel *jacobian_kernel(const mstmm_fused *code) { return code->jacobian; }
 static kernel *jacobian_rate_kernel(const mstmm_fused *code) { return code->jacobian_rate; }
 

@@ -9,8 +9,8 @@
 /* Increase of the stiffness by the loss factors. */
 static int write_losses(mstmm_response *of)
 {
-    real *lost = of->brought + 2 * of->n_numbers;
-    const int code = mstmm_tangent_brought(of->stiffer, 0, 0, 1);
+    real *lost = of->contributions + 2 * of->n_numbers;
+    const int code = mstmm_tangent_contributions(of->stiffer, 0, 0, 1);
     if (code) of->at->failure = of->stiffer->failure;
     for (int64_t k = 0; k < of->n_numbers; k++)
         lost[k] = of->stiffer->numbers[k] - of->at->numbers[k];
@@ -21,15 +21,15 @@ int mstmm_response_begin(mstmm_response *of)
 {
     mstmm_tangent *at = of->at;
     const size_t n = (size_t)of->n_numbers;
-    real *by_rate = of->brought, *by_square = by_rate + n;
-    int code = mstmm_tangent_brought(at, 0, 0, MSTMM_STILL);
+    real *by_rate = of->contributions, *by_square = by_rate + n;
+    int code = mstmm_tangent_contributions(at, 0, 0, MSTMM_STILL);
     if (code) return code;
     memcpy(by_square, at->numbers, n * sizeof(real));
-    code = mstmm_tangent_brought(at, 1, 0, MSTMM_STILL);
+    code = mstmm_tangent_contributions(at, 1, 0, MSTMM_STILL);
     for (size_t k = 0; k < n; k++) by_rate[k] = at->numbers[k] - by_square[k];
-    if (!code) code = mstmm_tangent_brought(at, 0, 1, MSTMM_STILL);
+    if (!code) code = mstmm_tangent_contributions(at, 0, 1, MSTMM_STILL);
     for (size_t k = 0; k < n; k++) by_square[k] = at->numbers[k] - by_square[k];
-    if (!code) code = mstmm_tangent_brought(at, 0, 0, 1);
+    if (!code) code = mstmm_tangent_contributions(at, 0, 0, 1);
     return code || !of->stiffer ? code : write_losses(of);
 }
 

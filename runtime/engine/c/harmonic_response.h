@@ -18,7 +18,7 @@ typedef struct {
         *stiffer; /* the same, its elastic stiffness by the losses larger; NULL: no losses */
     int lanes;           /* frequencies at a time, 2 or 4; 0: as many as the processor takes */
     int64_t n_numbers;   /* see mstmm_tangent_lay */
-    real *brought; /* 3 n_numbers: what s, s^2 and losses bring; the rest is the tangent's */
+    real *contributions; /* 3 n_numbers: what s, s^2 and losses bring; the rest is the tangent's */
     real *numbers; /* n_numbers complex */
     real *workspace; /* as many complex as the model has */
     real *vectors; /* 2 nu complex */

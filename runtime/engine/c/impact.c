@@ -35,7 +35,7 @@ static parts impact_parts(const mstmm_scene_run *run, const mstmm_event_action *
     return at;
 }
 
-int mstmm_hook_struck(mstmm_state *state)
+int mstmm_hook_apply_impact(mstmm_state *state)
 {
     const mstmm_strike *strike = state->strike;
     if (!strike) return 0;

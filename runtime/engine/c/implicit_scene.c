@@ -150,7 +150,7 @@ static int looped_solve(void *context, const double *r, const double *rho_q, con
     mstmm_scene_run *run = context;
     const int nq = run->model->nq, nu = run->model->nu;
     mstmm_tangent *base = run->base;
-    if (base->laws_alone) return looped_solve_by_laws(run, r, rho_q, rho_u, dq, du, da);
+    if (base->approximate) return looped_solve_by_laws(run, r, rho_q, rho_u, dq, du, da);
     real *known_q = run->known, *still = known_q + nq, *known_a = still + nu;
     const mstmm_known known = {.q = known_q, .a = known_a};
     const int evaluated = run->implicit.evaluated, some = rho_q || rho_u || evaluated;
@@ -184,7 +184,7 @@ static int looped_impose(void *context, double t, double *y, double *a)
                          .u = y + model->nq,
                          .memory = run->memory,
                          .failure = &run->failure};
-    const int code = mstmm_run_given(&state);
+    const int code = mstmm_run_prescribed_values(&state);
     if (code) return code;
     memcpy(y, state.q, (size_t)model->nq * sizeof(real));
     memcpy(y + model->nq, state.u, (size_t)model->nu * sizeof(real));

@@ -55,7 +55,7 @@ static int path_efforts(mstmm_state *state, const mstmm_probe *probe, int direct
                               .offset = probe->offset, .F = load, .M = load + 3,
                               .e = block + MSTMM_BLOCK_E);
     for (int i = probe->body; i >= 0; i = bodies[i].parent) {
-        const int code = mstmm_at_felt_by(state, i);
+        const int code = mstmm_at_hinge_efforts(state, i);
         if (code) return code;
         for (int k = 0; k < bodies[i].nu; k++)
             row[bodies[i].u + k] = state->required[bodies[i].u + k];

@@ -27,16 +27,16 @@ static int is_released(const mstmm_state *state, const mstmm_loop_row *row)
     return row->release >= 0 && fabs(state->memory[row->release]) > 0;
 }
 
-int mstmm_hook_rows_begun(mstmm_state *state)
+int mstmm_hook_begin_rows(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     const int keeps = state->refined && !(state->closing > 0);
     real *first = row_numbers(state, 0), *sums = row_numbers(state, model->n_rows);
     real *end = state->workspace + model->loops + model->loops_summed;
     for (int r = 0; keeps && r < model->n_rows; r++) {
-        real *numbers = row_numbers(state, r), told = numbers[MSTMM_ROW_X];
+        real *numbers = row_numbers(state, r), previous = numbers[MSTMM_ROW_X];
         memset(numbers, 0, MSTMM_ROW * sizeof(real));
-        numbers[MSTMM_ROW_TOLD] = told;
+        numbers[MSTMM_ROW_PREVIOUS_X] = previous;
     }
     if (keeps) first = sums; /* else in one call: each call has a fixed cost */
     memset(first, 0, (size_t)(end - first) * sizeof(real));
@@ -46,10 +46,10 @@ int mstmm_hook_rows_begun(mstmm_state *state)
                                                      ? (real)INFINITY
                                                      : row->softness + state->give * row->mobility;
     }
-    return model->n_couplings ? mstmm_hook_couplings_valued(state) : 0;
+    return model->n_couplings ? mstmm_hook_evaluate_couplings(state) : 0;
 }
 
-int mstmm_hook_rows_asked(mstmm_state *state)
+int mstmm_hook_set_row_targets(mstmm_state *state)
 {
     for (int r = 0; state->asked && r < state->model->n_rows; r++)
         row_numbers(state, r)[MSTMM_ROW_KNOWN] = state->asked[r];
@@ -179,7 +179,7 @@ int mstmm_fill_driven(const mstmm_model *model, real *workspace, real t, real *q
                          .observed = 1,
                          .failure = failure};
     if (!model->n_drives) return 0;
-    const int code = mstmm_run_given(&state);
+    const int code = mstmm_run_prescribed_values(&state);
     if (code) return code;
     memcpy(q, state.q, (size_t)model->nq * sizeof(real));
     memcpy(u, state.u, (size_t)model->nu * sizeof(real));

@@ -12,9 +12,9 @@ static int row_of_speed(mstmm_state *state, int body, int speed, real *matrix)
     int code;
     for (int i = body; i >= 0; i = bodies[i].parent)
         memset(mstmm_block(state->model, state->workspace, i) + MSTMM_BLOCK_E, 0, 6 * sizeof(real));
-    if ((code = mstmm_at_exerted(state, body))) return code;
+    if ((code = mstmm_at_outboard_load(state, body))) return code;
     for (int i = body; i >= 0; i = bodies[i].parent) {
-        if ((code = mstmm_at_felt_by(state, i))) return code;
+        if ((code = mstmm_at_hinge_efforts(state, i))) return code;
         for (int k = 0; k < bodies[i].nu; k++) {
             const int64_t other = bodies[i].u + k;
             matrix[other * nu + speed] = matrix[speed * nu + other] = state->required[other];

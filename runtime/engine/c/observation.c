@@ -32,7 +32,7 @@ static int complete_state(mstmm_state *state, const real *q, const real *u)
         if (code) return code;
     }
     state->hinges_known = 1;
-    return mstmm_run_posed(state);
+    return mstmm_run_poses_only(state);
 }
 
 void mstmm_point_shown(const mstmm_state *state, const mstmm_probe *probe, const real *delta,
@@ -46,8 +46,8 @@ void mstmm_point_shown(const mstmm_state *state, const mstmm_probe *probe, const
                        .motion = motion, .delta = delta, .offset = probe->offset,
                        .gravity = moves ? state->model->gravity : mstmm_zeros, .x_K = out,
                        .v_K = out + 3, .a_K = out + 6);
-    mstmm_frames_turning(.A = a, .motion = motion, .delta = delta, .w_K = out + 9,
-                         .alpha_K = out + 12);
+    mstmm_frames_angular_motion(.A = a, .motion = motion, .delta = delta, .w_K = out + 9,
+                                .alpha_K = out + 12);
     mstmm_frames_end_frame(.A = a, .R_end = probe->axes, .A_end = out + 15);
 }
 
@@ -70,8 +70,8 @@ static void observe_hinges(const mstmm_state *state, const real *udot,
                               .delta = block + MSTMM_BLOCK_DELTA, .A = block + MSTMM_BLOCK_A,
                               .f = load, .force = force, .moment = moment);
         if (wanted->loads) {
-            mstmm_frames_moment_at(.A = block + MSTMM_BLOCK_A, .offset = body->connection + 12,
-                                   .f = load, .moment = moment);
+            mstmm_frames_moment_about(.A = block + MSTMM_BLOCK_A, .offset = body->connection + 12,
+                                      .f = load, .moment = moment);
             memcpy(wanted->loads + 6 * (size_t)i, force, sizeof force);
             memcpy(wanted->loads + 6 * (size_t)i + 3, moment, sizeof moment);
         }

@@ -216,7 +216,8 @@ static int solve_tree(mstmm_tangent *at, const real *r, const mstmm_known *known
     /* Hinges that close loops are no part of the tree. */
     for (int i = 0; i < all->n_rows; i++)
         if (all->rows[i].speed >= 0) x[all->rows[i].speed] = 0;
-    const int code = known ? mstmm_run_tangent_beyond(&state) : mstmm_run_tangent_solution(&state);
+    const int code =
+        known ? mstmm_run_tangent_with_increments(&state) : mstmm_run_tangent_solution(&state);
     set_efforts(at, pass, 0, parts.column);
     return code;
 }

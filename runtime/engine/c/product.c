@@ -77,8 +77,8 @@ static void hinge_efforts(const mstmm_state *state, int index, real *force, real
     const mstmm_body *body = &state->model->bodies[index];
     real *block = state->workspace + body->block;
     const real *tau = hinge_tau(state, index), *axes = block + MSTMM_BLOCK_A;
-    if (body->nu == 6) mstmm_frames_turned(.A = axes, .b = tau, .b_0 = force);
-    mstmm_frames_turned(.A = axes, .b = tau + body->nu - 3, .b_0 = moment);
+    if (body->nu == 6) mstmm_frames_to_inertial(.A = axes, .b = tau, .b_0 = force);
+    mstmm_frames_to_inertial(.A = axes, .b = tau + body->nu - 3, .b_0 = moment);
 }
 
 /* Axis of a pin, inertial axes. */
@@ -86,7 +86,7 @@ static void hinge_axis(const mstmm_state *state, int index, real *axis)
 {
     static const real z[3] = {0, 0, 1};
     const real *block = state->workspace + state->model->bodies[index].block;
-    mstmm_frames_turned(.A = block + MSTMM_BLOCK_A, .b = z, .b_0 = axis);
+    mstmm_frames_to_inertial(.A = block + MSTMM_BLOCK_A, .b = z, .b_0 = axis);
 }
 
 /* Offset of P from Q, zero for pins and balls; inertial axes. */
@@ -97,7 +97,7 @@ static void hinge_offset(const mstmm_state *state, int index, real *offset)
     const real *parent = mstmm_block(state->model, state->workspace, body->parent);
     real gap[3];
     for (int i = 0; i < 3; i++) gap[i] = block[MSTMM_BLOCK_SHIFT + i] - body->connection[9 + i];
-    mstmm_frames_turned(.A = parent + MSTMM_BLOCK_A, .b = gap, .b_0 = offset);
+    mstmm_frames_to_inertial(.A = parent + MSTMM_BLOCK_A, .b = gap, .b_0 = offset);
 }
 
 /* The six rows of the free tip, of which the last hinge's condition makes some vanish but for
@@ -251,8 +251,9 @@ static int hinge_matrix(const mstmm_state *state, int index, int alone, real *st
         hinge_axis(state, index, axis);
         hinge_axis(state, next < 0 ? index : next, next_axis);
         if (next >= 0 && !alone) tau[0] = *hinge_tau(state, next);
-        mstmm_frames_turned(.A = parent + MSTMM_BLOCK_A,
-                            .b = alone ? mstmm_zeros : parent + MSTMM_BLOCK_MOTION, .b_0 = omega);
+        mstmm_frames_to_inertial(.A = parent + MSTMM_BLOCK_A,
+                                 .b = alone ? mstmm_zeros : parent + MSTMM_BLOCK_MOTION,
+                                 .b_0 = omega);
         return mstmm_classical_pin_transfer(.U = store + BODY, .F_scale = store + SCALE, .a = axis,
                                             .u = state->u + body->u, .omega_I = omega,
                                             .a_n = next_axis, .tau_n = tau, .U_h = store + HINGE,
@@ -471,7 +472,7 @@ int mstmm_hook_product(mstmm_state *state)
 }
 
 /* Largest deviation of the product from the Riccati sweep; keeps the product's values. */
-int mstmm_hook_product_compared(mstmm_state *state)
+int mstmm_hook_compare_product(mstmm_state *state)
 {
     real open = 0;
     const int code = state->model->looped ? solve_closed_chain(state, &open) : 0;

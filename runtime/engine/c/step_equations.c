@@ -107,7 +107,7 @@ static int run_tangent(mstmm_tangent *at, int (*run)(mstmm_state *), int *negati
     mstmm_state state = known_state(at, &parts), slope = tangent_slope(at, &parts, parts.answer);
     state.slope = &slope;
     state.tangents = &step;
-    at->laws_alone = 0;
+    at->approximate = 0;
     at->kept = kept;
     memset(parts.d_q, 0, (size_t)model->nq * sizeof(real));
     memset(parts.d_u, 0, (size_t)model->nu * sizeof(real));
@@ -116,10 +116,10 @@ static int run_tangent(mstmm_tangent *at, int (*run)(mstmm_state *), int *negati
     return run(&state);
 }
 
-int mstmm_tangent_brought(mstmm_tangent *at, real rate, real s, real sq)
+int mstmm_tangent_contributions(mstmm_tangent *at, real rate, real s, real sq)
 {
     set_steps(at, rate, s, sq, 0);
-    return run_tangent(at, mstmm_run_tangent_brought, NULL, 1);
+    return run_tangent(at, mstmm_run_tangent_contributions, NULL, 1);
 }
 
 int mstmm_tangent_factor(mstmm_tangent *at, real rate, real s, real sq, real kappa)
@@ -143,7 +143,7 @@ static mstmm_tangents laws_steps(const mstmm_tangent *at)
                             .rate = at->rate / at->s,
                             .s = 1,
                             .sq = at->s * at->sq,
-                            .laws_alone = 1};
+                            .approximate = 1};
 }
 
 int mstmm_laws_factor(mstmm_tangent *at, real rate, real s, real sq, real kappa)
@@ -151,7 +151,7 @@ int mstmm_laws_factor(mstmm_tangent *at, real rate, real s, real sq, real kappa)
     const mstmm_model *model = at->model;
     const mstmm_parts parts = tangent_parts(at);
     set_steps(at, rate, s, sq, kappa);
-    at->laws_alone = 1;
+    at->approximate = 1;
     mstmm_tangents step = laws_steps(at);
     mstmm_state state = known_state(at, &parts), slope = tangent_slope(at, &parts, parts.answer);
     state.slope = &slope;
@@ -159,7 +159,7 @@ int mstmm_laws_factor(mstmm_tangent *at, real rate, real s, real sq, real kappa)
     memset(parts.d_q, 0, (size_t)model->nq * sizeof(real));
     memset(parts.d_u, 0, (size_t)model->nu * sizeof(real));
     memset(parts.d_a, 0, (size_t)model->nu * sizeof(real));
-    return mstmm_run_laws_alone(&state);
+    return mstmm_run_approximate_tangent(&state);
 }
 
 int mstmm_laws_solve(mstmm_tangent *at, const real *r, const real *dq, const real *du, real *a)
@@ -177,7 +177,7 @@ int mstmm_laws_solve(mstmm_tangent *at, const real *r, const real *dq, const rea
         slope.u = du;
     }
     memset(slope.workspace, 0, MSTMM_BLOCK_FIXED * sizeof(real)); /* the ground's */
-    return mstmm_run_laws_solution(&state);
+    return mstmm_run_approximate_solution(&state);
 }
 
 /* --- solutions --- */
@@ -192,7 +192,7 @@ static int solve_speeds_by_laws(mstmm_tangent *at, const real *r, real *du)
 int mstmm_tangent_solve(mstmm_tangent *at, const real *r, const mstmm_known *known, real *x)
 {
     int code = 0;
-    if (at->laws_alone) return solve_speeds_by_laws(at, r, x);
+    if (at->approximate) return solve_speeds_by_laws(at, r, x);
     if (known && !at->kept) { /* first call with known increments: more will follow */
         at->keeps = 1;
         code = mstmm_tangent_factor(at, at->rate, at->s, at->sq, at->kappa);

@@ -44,7 +44,7 @@ typedef struct {
     void (*hinge)(void), (*forward)(void), (*condense)(void), (*recover)(void);
     void (*inertia)(void), (*bias_load)(void), (*energy)(void);
     void (*rates_by_coordinates)(void), (*rates_by_speeds)(void);
-    void (*forward_kept)(void), (*directions)(void); /* NULL: step by step */
+    void (*body_motion)(void), (*directions)(void); /* NULL: step by step */
     void (*hinge_slope)(void), (*bias_load_slope)(void), (*load_by_motion)(void);
     /* NULL: no such connection */
     void (*link_turn)(void), (*link_forward)(void), (*link_condense)(void), (*link_recover)(void);
@@ -226,7 +226,7 @@ typedef struct {
     int n_pending;
     const mstmm_pending *pending;
     const real *given;
-    int aside, idle; /* no sweep to the root, or no pass at all, is needed */
+    int omitted, idle; /* no sweep to the root, or no pass at all, is needed */
 } mstmm_flat_body;
 
 /* Corrections of closed loops, instead of accelerations. */
@@ -386,7 +386,7 @@ typedef struct mstmm_tangents {
     int kept; /* S of every body stays */
     /* Along unknowns x: du = rate x, da = s x, dq = (sq - kappa g_q)^-1 N x */
     real rate, s, sq, kappa;
-    int laws_alone; /* kappa is ignored: see mstmm_laws_factor */
+    int approximate; /* kappa is ignored: see mstmm_laws_factor */
     int shifted; /* some increments of a right-hand side are known */
     int *negative; /* whether the determinant is negative so far; NULL: that is a failure */
     const real *rho; /* nq: errors of the rates */
@@ -499,7 +499,7 @@ static inline int mstmm_idle(int observed, const mstmm_body *body)
 }
 
 /* True if the sweep from tips to root skips this body. */
-static inline int mstmm_aside(const mstmm_model *model, int observed, int index)
+static inline int mstmm_omitted(const mstmm_model *model, int observed, int index)
 {
     return (model->looped && model->looped[index].closure) ||
            mstmm_idle(observed, &model->bodies[index]);

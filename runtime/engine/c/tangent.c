@@ -190,8 +190,8 @@ int mstmm_tangent_coordinates(mstmm_tangent *at, const real *du, const real *rho
             for (int j = 0; j < body->nu; j++)
                 dq[body->q + j] = (du[body->u + j] + step.rho[body->q + j]) / at->sq;
         } else {
-            const int code = at->laws_alone ? iterate_coordinates(&state, at, body, i)
-                                            : mstmm_at_lagged(&state, i);
+            const int code = at->approximate ? iterate_coordinates(&state, at, body, i)
+                                             : mstmm_at_coordinate_increment(&state, i);
             if (code) return code;
         }
         if (!body->modal) continue;

@@ -43,7 +43,7 @@ typedef struct {
     real *answers; /* passes x nu: to one of each unknown */
     real *closure; /* n_coupled x (numbers of a row of the matrix + 4) */
     int known; /* there has been a residual since the memory changed */
-    int laws_alone; /* the last tangent was that of mstmm_laws_factor */
+    int approximate; /* the last tangent was that of mstmm_laws_factor */
     int on_positions; /* rows are those of positions only: see mstmm_across_solve */
     int rows_of_motion; /* rows are those of small motions x, J x = 0, for any s */
     int counts; /* pivots may be negative: they are counted */
@@ -80,7 +80,7 @@ void mstmm_rates_slope(const mstmm_tangent *at, real *d_rates);
  * the slopes of the coordinates' rates N u by the coordinates. */
 int mstmm_tangent_factor(mstmm_tangent *at, real rate, real s, real sq, real kappa);
 /* Fills `numbers` without the elimination: linear in rate, s and 1 / sq. */
-int mstmm_tangent_brought(mstmm_tangent *at, real rate, real s, real sq);
+int mstmm_tangent_contributions(mstmm_tangent *at, real rate, real s, real sq);
 /* Change of every coupling along x for the coordinates, d_u and d_a (nu). */
 int mstmm_coupled_along(mstmm_tangent *at, const real *x, const real *d_u, const real *d_a,
                         real *changes);

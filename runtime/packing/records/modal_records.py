@@ -33,8 +33,8 @@ class ModalRecords:
         if modal.drag is not None:
             record.drag = self.memory.new("mstmm_moments *")
             self._moments(record.drag, modal.drag)
-        for name, matrix in modal.matrices.named.items():
-            setattr(record, name, array(matrix))
+        matrices = modal.matrices.named
+        record.stiffness, record.damping = array(matrices["stiffness"]), array(matrices["damping"])
         self.modal[place] = self._reserve(self.lib.mstmm_modal_numbers(modal.n))
         self._modal[place] = record
         return record

@@ -43,7 +43,7 @@ def attach_planar_bodies(
         if numbers not in shared:
             shared[numbers] = memory.reals(numbers)
         record.given = shared[numbers]
-        record.idle = record.aside = int(body.idle)
+        record.idle = record.omitted = int(body.idle)
     records = CRecords(memory.ffi, "mstmm_flat_body", system.count)
     records.copy(slice(None), prototypes, system.distinct_indices)
     places = system.first_indices
@@ -51,7 +51,7 @@ def attach_planar_bodies(
         records.write(name, column)
     for name in _LOOP_FIELDS:
         records.column(name)[:] = looped.column(name)
-    records.column("aside")[[closure.frame for closure in system.closures]] = 1
+    records.column("omitted")[[closure.frame for closure in system.closures]] = 1
     memory.keep_alive.append(records)
     model.flat, model.flat_numbers = records.array, place
     model.flat_gravity = (axes.T @ system.gravity)[:2].tolist()

@@ -26,7 +26,7 @@ class ModalPivots:
     """
 
     def __init__(self, packed: PackedScene, lib: Any) -> None:
-        self._rows, self._based = lib.MSTMM_MODES_S_RF_PER_MODE, lib.MSTMM_MODES_BASED_PER_MODE
+        self._rows, self._rebased = lib.MSTMM_MODES_S_RF_PER_MODE, lib.MSTMM_MODES_S_RF_I_PER_MODE
         self._gain, self._inner = lib.MSTMM_MODES_GAIN_PER_MODE, lib.MSTMM_MODES_S_FF_PER_MODE
         self._subspace = lib.MSTMM_SECTION_H_PER_MODE
         self.frames: dict[int, tuple[int, int, int | None]] = {}
@@ -57,7 +57,7 @@ class ModalPivots:
                 carried[i] = motion
         for i, (n, offset, section_offset) in self.frames.items():
             gain, frame_motion = gains[i]
-            first = offset + n * (self._rows if section_offset is None else self._based)
+            first = offset + n * (self._rows if section_offset is None else self._rebased)
             rows = numbers[first : first + 6 * n].reshape(6, n)
             frame_rounding = np.abs(np.diag(S[i] + rows @ gain))
             first_ff = offset + self._inner * n

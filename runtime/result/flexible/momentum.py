@@ -85,7 +85,7 @@ class Momenta:
 
         Evaluated by the kernel from which the engine obtains them.
         """
-        packed = self.observations.unmerged.engine.packed
+        packed = self.observations.unmerged_observations.engine.packed
         body_index, axes, offset = packed.end(name)
         body, ffi, numbers = packed.system.body(body_index), packed.ffi, np.zeros(21)
         kernel_pointer = packed.elements[body.body].functions["inertia"]

@@ -37,7 +37,7 @@ _CELL_COLOUR, _SECTION_COLOUR = (186, 190, 196), (150, 154, 160)
 def render_page(stage: SceneGraph) -> str:
     """Page as text. EnvironmentFailure without the extra."""
     if not _MIN_SIZE < stage.size < _MAX_SIZE:
-        stage = stage.scaled(_SCALED_SIZE / stage.size)
+        stage = stage.with_scale(_SCALED_SIZE / stage.size)
     with _start_server() as server:
         recorder = server.get_scene_serializer()
         animated_scene = _AnimatedScene(server.scene, stage)

@@ -122,11 +122,13 @@ class SceneGraph:
     clock: tuple[str, str] = ("t", "s")
     choices: tuple[str, ...] = ()
 
-    def scaled(self, factor: float) -> SceneGraph:
+    def with_scale(self, factor: float) -> SceneGraph:
         """Scene graph scaled by a factor; the values of labels are unchanged."""
         scaled_poses = {owner: replace(pose, position=factor * pose.position)
                  for owner, pose in self.poses.items()}  # fmt: skip
-        solids = tuple(replace(item, surface=item.surface.scaled(factor)) for item in self.solids)
+        solids = tuple(
+            replace(item, surface=item.surface.with_scale(factor)) for item in self.solids
+        )
         bent = tuple(
             replace(item, vertices=factor * item.vertices) for item in self.deforming_surfaces
         )

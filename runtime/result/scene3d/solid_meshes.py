@@ -27,7 +27,7 @@ class Surface:
     vertices: Array
     faces: Faces
 
-    def scaled(self, factor: float) -> Surface:
+    def with_scale(self, factor: float) -> Surface:
         """Surface scaled about the origin of its axes."""
         return replace(self, vertices=factor * self.vertices)
 

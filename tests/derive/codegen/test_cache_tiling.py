@@ -11,7 +11,7 @@ from mstmm.cli import stored_elements
 from mstmm.derive.codegen.cache_tiling import ChainedPasses, TiledRun, tile_sweep
 from mstmm.derive.codegen.prefetch import prefetch_function
 from mstmm.derive.codegen.sweep_text import sweep_files
-from mstmm.derive.schedule.approximate_tangent import LAWS_ALONE, LAWS_FACTORISE, LAWS_OWN
+from mstmm.derive.schedule.approximate_tangent import APPROXIMATE_TANGENT, LAWS_FACTORISE, LAWS_OWN
 from mstmm.derive.schedule.mass_matrix_solve import COLUMN
 from mstmm.derive.schedule.pass_steps import ROOT_TO_TIPS, TIPS_TO_ROOT, Copy, Pass, Run, Sweep
 from mstmm.derive.schedule.sweeps import ACCELERATIONS
@@ -26,7 +26,7 @@ def groups(*runs: Run) -> list[TiledRun]:
 
 
 def test_bodies_are_begun_with_their_laws() -> None:
-    (group,) = (part for part in tile_sweep(LAWS_ALONE) if isinstance(part, TiledRun))
+    (group,) = (part for part in tile_sweep(APPROXIMATE_TANGENT) if isinstance(part, TiledRun))
     assert [run.whole.name for run in group.begun if run.whole] == [
         "laws_own", "laws_rates", "laws_own_slopes"
     ]  # fmt: skip
@@ -60,7 +60,7 @@ def test_what_cannot_follow_parts_a_chain() -> None:
         parted = (runs[0], between, runs[1])
         assert tile_sweep(Sweep("sweep", "", parted)) == list(parted)
     assert tile_sweep(Sweep("sweep", "", (spares, spares))) == [spares, spares]
-    posed = Run(hook="drive_values", when="posed")
+    posed = Run(hook="drive_values", when="poses")
     first, group, last = tile_sweep(Sweep("sweep", "", (posed, runs[0], posed, runs[1], posed)))
     assert isinstance(group, ChainedPasses)
     assert first == last == posed and group.runs == (runs[0], posed, runs[1])
@@ -75,8 +75,8 @@ def test_what_reads_others_is_not_begun(slot: str) -> None:
     assert groups(Run(whole=BEGUN), Run(whole=SWEPT))
     assert not groups(Run(whole=BEGUN), Run(whole=other), Run(whole=SWEPT))
     assert not groups(Run(whole=BEGUN), Run(hook="drive_values"), Run(whole=SWEPT))
-    assert not groups(Run(whole=BEGUN, when="posed"), Run(whole=SWEPT))
-    assert groups(Run(whole=BEGUN), Run(whole=other, when="posed"), Run(whole=SWEPT))
+    assert not groups(Run(whole=BEGUN, when="poses"), Run(whole=SWEPT))
+    assert groups(Run(whole=BEGUN), Run(whole=other, when="poses"), Run(whole=SWEPT))
 
 
 def test_what_is_asked_for_is_what_is_used() -> None:

@@ -83,7 +83,7 @@ def _turn(v: Any, t: Any) -> Any:
 def relative(c: Body, b: Body, end: list[Any], t: Any) -> tuple[dict[str, Any], list[Any]]:
     """Outputs of the kernels meet and slip at a time."""
     of_c, of_b = c.motion(t), b.motion(t)
-    met = evaluate(KERNELS["meet"], {
+    met = evaluate(KERNELS["relative_pose"], {
         "A_C": of_c["A"], "x_C": of_c["x"], "A_B": of_b["A"], "x_B": of_b["x"],
         "r_e": end, "Rc": [1, 0, 0, 0, 1, 0, 0, 0, 1], "r": [0, 0, 0],
     }, 60)  # fmt: skip

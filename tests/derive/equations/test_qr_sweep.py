@@ -163,7 +163,7 @@ def across(nu: int, given: Values) -> Values:
 
 
 def restored(rows_of: Any, taken: Any, rest: Any) -> Values:
-    return evaluate(STEPS["restored"], {"U": rows_of, "d": taken, "e": rest}, DIGITS)
+    return evaluate(STEPS["rows_to_riccati"], {"U": rows_of, "d": taken, "e": rest}, DIGITS)
 
 
 @pytest.mark.parametrize("missing", [None, 0, 4])

@@ -54,7 +54,7 @@ def slots_of(step: Step) -> Iterator[str]:
     if isinstance(step, Call):
         yield from (slot for port, slot in ports_of(step).items() if port != "n")
     for field in ("to", "source", "free", "imposed", "places", "rotation", "position", "motion",
-                  "subspace", "chosen", "pivots", "own", "whole", "expression"):  # fmt: skip
+                  "subspace", "offset", "pivots", "own", "whole", "expression"):  # fmt: skip
         value = getattr(step, field, "")
         if isinstance(value, str) and value:
             yield value

@@ -22,7 +22,7 @@ ELEMENTS = [
 INSTANCES = {("sweep", "planar_pin")}
 #: Kernels made from others: all derivatives of an output, several steps in one.
 MADE = {
-    "load_by_motion", "rates_by_coordinates", "rates_by_speeds", "forward_kept", "directions",
+    "load_by_motion", "rates_by_coordinates", "rates_by_speeds", "body_motion", "directions",
 }  # fmt: skip
 
 

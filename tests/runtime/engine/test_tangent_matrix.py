@@ -212,7 +212,7 @@ def test_hinges_without_kernels_that_do_several_steps_in_one(rng: Generator) -> 
 
     own, record = answers(), model.looped.packed.model
     for i in range(record.n_bodies):
-        for name in ("rates_by_coordinates", "rates_by_speeds", "forward_kept", "directions"):
+        for name in ("rates_by_coordinates", "rates_by_speeds", "body_motion", "directions"):
             setattr(record.bodies[i].kernels, name, model.looped.ffi.NULL)
     for found, expected in zip(answers(), own, strict=True):
         assert worst(found, expected) < 1e-12

@@ -197,8 +197,8 @@ def test_many_nodes_are_seen_by_some() -> None:
 
 @pytest.mark.parametrize("size", [1e-3, 1e4])
 def test_pages_of_small_and_large_scenes_are_drawn_at_a_size_that_is_seen(size: float) -> None:
-    stage = build_scene_graph(scenes.run(), "x", most=3).scaled(size)
-    again = stage.scaled(10.0 / stage.size)
+    stage = build_scene_graph(scenes.run(), "x", most=3).with_scale(size)
+    again = stage.with_scale(10.0 / stage.size)
     assert again.size == pytest.approx(10.0)
     pose, other = stage.poses["bodies/rod"], again.poses["bodies/rod"]
     assert other.position / again.size == pytest.approx(pose.position / stage.size)
