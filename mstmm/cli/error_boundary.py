@@ -9,7 +9,8 @@ import os
 import sys
 import traceback
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import cache
 from typing import NoReturn
 
 from mstmm import signal_handling
@@ -63,10 +64,18 @@ def run(arguments: Sequence[str]) -> int:
         return code
 
 
-def _run_command(arguments: list[str]) -> int:
+@cache
+def _command_group() -> Callable[..., object]:
+    """All commands with their options, put together once in a process."""
+    from typer.main import get_command
+
     from .app import app
 
-    code = app(args=arguments, prog_name="mstmm", standalone_mode=False)
+    return get_command(app)
+
+
+def _run_command(arguments: list[str]) -> int:
+    code = _command_group()(args=arguments, prog_name="mstmm", standalone_mode=False)
     return code if isinstance(code, int) else SUCCESS
 
 

@@ -72,6 +72,7 @@ def generated_text(full_name: str, ending: str) -> str | None:
     return file.read_text(encoding="utf-8") if file.is_file() else None
 
 
+@cache
 def generated_specs() -> dict[tuple[str, str], ElementSpec]:
     """All generated elements with their kernels, by (kind, name)."""
     from mstmm.ir.json_format import element_from_json

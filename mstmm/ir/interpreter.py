@@ -75,8 +75,13 @@ class Interpreter(ABC):
     def inner(self, statement: Inner) -> None:
         """Execute a statement that is allowed inside a loop."""
         if isinstance(statement, Assign):
-            operation = self.operations[statement.op]
-            self.temporaries[statement.number] = operation(*map(self.value, statement.args))
+            operation, value, known = self.operations[statement.op], self.value, self.temporaries
+            known[statement.number] = operation(
+                *[
+                    known[argument.number] if isinstance(argument, Temporary) else value(argument)
+                    for argument in statement.args
+                ]
+            )
         else:
             self.temporaries[statement.number] = self.total(statement)
 

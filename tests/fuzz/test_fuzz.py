@@ -21,11 +21,11 @@ FOUND = sorted((Path(__file__).parent / "found").glob("*.json"))
 
 def test_no_mutant_does_worse_than_a_refusal_or_a_run() -> None:
     campaign = Campaign(seed=9, limits=Limits(), engine="looped", keep=None)
-    campaign.run(first=43, count=40, jobs=2)
+    campaign.run(first=43, count=25, jobs=2)
     assert not campaign.failures, campaign.table()
     refused = campaign.outcomes[REFUSED]
     # Mutants that are all refused try no run, mutants that all run try no message.
-    assert min(refused, 40 - refused) >= 5, campaign.table()
+    assert min(refused, 25 - refused) >= 3, campaign.table()
 
 
 def test_mutants_that_bounce_on_code_of_their_own() -> None:

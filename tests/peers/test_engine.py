@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import mujoco
 import numpy as np
 import pytest
 
-import mstmm
 from tests.reference.compare import drawn, fresh, worst
+from tests.support.models import compile_scene
 from tests.support.peers.mujoco_peer import TYPES, MujocoPeer
 from tests.support.peers.pinocchio_peer import PinocchioPeer
-
-
-def compiled(scene: dict[str, Any]) -> mstmm.Model:
-    return mstmm.compile(mstmm.Scene(**scene))
 
 
 @pytest.mark.parametrize("draw", range(25))
 def test_pinocchio_on_random_trees(draw: int, rng: np.random.Generator) -> None:
     scene, q, u = drawn(draw) if draw < 15 else fresh(rng)
-    model, peer = compiled(scene), PinocchioPeer(scene)
+    model, peer = compile_scene(scene), PinocchioPeer(scene)
     assert worst(model.accelerations(q, u, t=0.3), peer.accelerations(q, u, 0.3)) < 1e-9
     assert worst(model.mass_matrix(q), peer.mass_matrix(q)) < 1e-11
     asked = rng.uniform(-2, 2, len(u))
@@ -32,7 +26,7 @@ def test_pinocchio_on_random_trees(draw: int, rng: np.random.Generator) -> None:
 @pytest.mark.parametrize("draw", range(25))
 def test_mujoco_on_random_trees(draw: int, rng: np.random.Generator) -> None:
     scene, q, u = drawn(draw, types=TYPES) if draw < 15 else fresh(rng, types=TYPES)
-    model, peer = compiled(scene), MujocoPeer(scene)
+    model, peer = compile_scene(scene), MujocoPeer(scene)
     assert worst(model.accelerations(q, u, t=0.3), peer.accelerations(q, u, 0.3)) < 1e-9
     assert worst(model.mass_matrix(q), peer.mass_matrix(q)) < 1e-11
 
@@ -42,7 +36,7 @@ def test_mujoco_on_random_trees(draw: int, rng: np.random.Generator) -> None:
 )
 def test_pinocchio_on_long_chains(types: tuple[str, ...]) -> None:
     scene, q, u = drawn(77, types=types, chain=True, most=40, laws=False, loads=False)
-    model, peer = compiled(scene), PinocchioPeer(scene)
+    model, peer = compile_scene(scene), PinocchioPeer(scene)
     assert worst(model.accelerations(q, u), peer.accelerations(q, u)) < 1e-9
 
 
@@ -56,7 +50,7 @@ def test_motion_of_a_spatial_arm_against_mujoco() -> None:
     peer.data.qpos[:], peer.data.qvel[:] = peer.coordinates(q), peer.speeds(u, q)
     for _ in range(5000):
         mujoco.mj_step(peer.model, peer.data)
-    result = compiled(scene).simulate(
+    result = compile_scene(scene).simulate(
         t_end=0.5, rtol=1e-11, atol=1e-12, initial=(q, u), output_times=[0.0, 0.5]
     )
     assert result.success, result.message

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -39,6 +40,10 @@ if TYPE_CHECKING:
     from mstmm.scene.tables.beam import Beam
 
 
+#: Largest number of bodies kept; equal beams of this and of later scenes share them.
+_MAX_CACHED_BODIES = 64
+
+
 class BeamBodies:
     """Beams of one scene; equal beams with equal boundary conditions are computed once."""
 
@@ -47,7 +52,6 @@ class BeamBodies:
         self._plane = (
             PlanarMotionCheck(scene) if any(beam.modes is None for beam in scene.beam) else None
         )
-        self._cache: dict[str, ModalBody] = {}
 
     def body(self, beam: Beam) -> ModalBody:
         """Modal body of one beam.  Raises SceneError for linearly dependent shapes."""
@@ -55,12 +59,7 @@ class BeamBodies:
         conditions = boundary_conditions(self._environment, beam, data)
         idle = self._idle_directions(beam)
         support = self._supports.support_of(beam.name)
-        key = repr((beam.model_copy(update={"name": ""}), conditions, support, sorted(idle)))
-        if key not in self._cache:
-            self._cache[key] = checked_result(
-                f'beam "{beam.name}"', lambda: _beam_body(beam, data, conditions, support, idle)
-            )
-        body = self._cache[key]
+        body = _cached_body(_BeamSource(beam, data, conditions, support, idle))
         assert body.shapes is not None
         spans = {
             load.name: body.shapes.mean_section(*_span(load, data.length))
@@ -97,6 +96,35 @@ def beam_body(scene: Scene, beam: Beam) -> ModalBody:
 def _span(load: Load, length: float) -> tuple[float, float]:
     start, end = load.span or (0.0, length)
     return start, min(end, length)
+
+
+class _BeamSource:
+    """Cache key: everything that determines the body of a beam, except its name."""
+
+    def __init__(
+        self,
+        beam: Beam,
+        data: BeamData,
+        conditions: BoundaryConditions,
+        support: Support,
+        idle: frozenset[str],
+    ) -> None:
+        self.beam, self.arguments = beam, (beam, data, conditions, support, idle)
+        self._key = (
+            repr(beam.model_copy(update={"name": ""})), repr(conditions), sorted(idle),
+            support.motion.tobytes(), support.inertia.tobytes(),
+        )  # fmt: skip
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _BeamSource) and self._key == other._key
+
+    def __hash__(self) -> int:
+        return hash(self._key[0])
+
+
+@lru_cache(maxsize=_MAX_CACHED_BODIES)
+def _cached_body(source: _BeamSource) -> ModalBody:
+    return checked_result(f'beam "{source.beam.name}"', lambda: _beam_body(*source.arguments))
 
 
 def _beam_body(

@@ -25,12 +25,12 @@ from tests.reference.jets import Array
 from tests.reference.laws import Motion
 from tests.reference.random_scenes import random_scene, random_state
 from tests.reference.tree import Tree, read
+from tests.support.models import compile_scene
 from tests.support.scenes.constraints import (
     GRAVITY,
     MASS,
     RADIUS,
     Scene,
-    compiled,
     cycloid,
     disc,
     governor,
@@ -101,7 +101,7 @@ def test_random_trees(seed: int) -> None:
             rows.append(row)
             asked.append(more)
     assert rows
-    model = compiled(scene | {"constraint": rows})
+    model = compile_scene(scene | {"constraint": rows})
     along = 0.7 * np.ones(model.nu - tree.nu)
     found = model.accelerations(
         np.concatenate([q, 0 * along]), np.concatenate([u, along])
@@ -175,7 +175,7 @@ def test_a_disc_that_falls_flat() -> None:
 def test_a_bead_on_a_cycloid_swings_in_a_time_that_is_always_the_same(start: float) -> None:
     """Along the arc sigma = 4 a sin(s / 2) it obeys sigma'' = -(g / 4 a) sigma (Huygens)."""
     a = 0.5
-    model = compiled(cycloid(start, a))
+    model = compile_scene(cycloid(start, a))
     times = np.linspace(0.0, 4.0, 9)
     result = model.simulate(4.0, "dop853", rtol=1e-11, atol=1e-12, output_times=times)
     assert result.success, result.message
@@ -187,7 +187,7 @@ def test_a_governor_is_stiff_by_springs_alone() -> None:
     """Both balls rise alike, as with stiff springs, in a fraction of their evaluations."""
     found, evaluations = {}, {}
     for rods in ("constraint", "spring"):
-        result = compiled(governor(rods)).simulate(0.5, "dop853", rtol=1e-7)
+        result = compile_scene(governor(rods)).simulate(0.5, "dop853", rtol=1e-7)
         assert result.success, result.message
         assert result.statistics is not None
         found[rods], evaluations[rods] = result, result.statistics.evaluations
@@ -210,7 +210,7 @@ def test_a_length_that_cannot_be_reached() -> None:
                         "position": [3, 0, 0], "length": 1.5}],
     }  # fmt: skip
     with pytest.raises(mstmm.SceneError) as caught:
-        compiled(scene)
+        compile_scene(scene)
     assert 'constraint "rope"' in str(caught.value) and "has a gap of 0.5 m" in str(caught.value)
 
 

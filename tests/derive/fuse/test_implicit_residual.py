@@ -21,6 +21,7 @@ from mstmm.runtime.result.result import Result
 from mstmm.runtime.run.scene_system import SceneSystem
 from tests.reference.jets import Array
 from tests.runtime.engine.test_tangent_matrix import compiled, rigid, worst
+from tests.support.draws import draws
 from tests.support.scenes import random_flexible as engine_scenes
 
 Scene = dict[str, Any]
@@ -90,14 +91,14 @@ def condition(tangent: TangentMatrix) -> float:
     return float(np.linalg.cond(matrix / np.outer(size, size))) if len(rows) else 1.0
 
 
-@pytest.mark.parametrize("draw", range(8))
+@pytest.mark.parametrize("draw", draws(3, 8))
 def test_rigid_trees(draw: int, rng: Generator) -> None:
     """Every hinge, laws with friction and stops, efforts, loads and springs anywhere."""
     check(*rigid(rng), rng)
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
-@pytest.mark.parametrize("draw", range(4))
+@pytest.mark.parametrize("draw", draws(2, 4))
 def test_flexible_trees(draw: int, rng: Generator) -> None:
     check(*small(rng, draw % 2 == 0), rng)
 

@@ -16,6 +16,7 @@ from mstmm.runtime.packing.scene_packing import pack
 from mstmm.runtime.run.scene_system import SceneCode, SceneSystem
 from tests.reference.compare import worst
 from tests.reference.random_loops import random_mechanism
+from tests.support.models import compile_scene, looped_model
 from tests.support.scenes.constraints import cycloid, governor, on_a_plane, on_a_road
 from tests.support.scenes.linkages import bricard, cranks, four_bar
 from tests.support.scenes.published_mechanisms import Scene, andrews, four_bars
@@ -52,10 +53,6 @@ def driven(cut: str) -> Scene:
                               scene["hinge"][3]]}  # fmt: skip
 
 
-def compiled(scene: Scene, engine: str = "looped") -> mstmm.Model:
-    return mstmm.compile(mstmm.Scene(**scene), engine=engine)
-
-
 def interpreted(model: mstmm.Model, q: Any, u: Any) -> dict[str, Any]:
     """Everything that the fused IR gives of a state, with plain floats."""
     packed = model.packed_scene
@@ -70,7 +67,7 @@ def interpreted(model: mstmm.Model, q: Any, u: Any) -> dict[str, Any]:
 
 @pytest.mark.parametrize("name", SCENES)
 def test_interpreted_equals_looped(name: str, rng: np.random.Generator) -> None:
-    model = compiled(SCENES[name]())
+    model = looped_model(SCENES[name]())
     q, u = model.initial_state()
     u = u + rng.normal(scale=0.3, size=model.nu)
     found, wanted = interpreted(model, q, u), model.accelerations(q, u, TIME)
@@ -83,7 +80,7 @@ def test_interpreted_equals_looped(name: str, rng: np.random.Generator) -> None:
 def test_random_mechanisms(seed: int) -> None:
     """All kinds of hinges in the tree and cut, with laws, rotors, springs and loads."""
     scene, q, u = random_mechanism(seed)
-    model = compiled(scene)
+    model = looped_model(scene)
     found, wanted = interpreted(model, q, u), model.accelerations(q, u, TIME)
     assert worst(np.array(found["udot"]), wanted) < 1e-12
 
@@ -96,7 +93,7 @@ def both(request: pytest.FixtureRequest) -> tuple[mstmm.Model, mstmm.Model]:
         "disc": on_a_road, "wire": lambda: cycloid(0.4),
     }  # fmt: skip
     scene = made[request.param]()
-    return compiled(scene), compiled(scene, "fused")
+    return looped_model(scene), compile_scene(scene, "fused")
 
 
 def test_compiled_equals_looped(
@@ -164,11 +161,11 @@ def test_an_open_loop_is_named_alike() -> None:
 
 
 def test_other_numbers_take_the_same_code() -> None:
-    model = compiled(linkage("closing_pin", laws=False), "fused")
+    model = compile_scene(linkage("closing_pin", laws=False), "fused")
     changes = {"coupler.mass": 2.5, "crank.center_of_mass[0]": 0.2}
     changed = model.with_parameters(changes)
     assert changed.fusion.library is model.fusion.library
-    looped = compiled(linkage("closing_pin", laws=False)).with_parameters(changes)
+    looped = looped_model(linkage("closing_pin", laws=False)).with_parameters(changes)
     q, u = looped.initial_state()
     wanted = looped.accelerations(q, u)
     assert np.abs(changed.accelerations(q, u) - wanted).max() < AGREEMENT * np.abs(wanted).max()
@@ -177,7 +174,7 @@ def test_other_numbers_take_the_same_code() -> None:
 @pytest.mark.parametrize("cut", ["rocker_pin", "closing_pin"])
 def test_power_of_drives(cut: str) -> None:
     """What a drive needs contains what the rows of a cut hinge carry."""
-    model = compiled(driven(cut))
+    model = looped_model(driven(cut))
     begun = model.simulate(TIME, t_start=TIME, initial=model.initial_state())
     found = interpreted(model, begun.q[0], begun.u[0])
     wanted = begun.power()[0]
@@ -190,7 +187,7 @@ def test_rows_that_nothing_moves_cost_nothing(scene: str) -> None:
     """Closed by all rows of its pins a planar linkage has the operations that it has without those
     which say nothing."""
     one = linkage("closing_pin", laws=False) if scene == "four-bar" else four_bars(2)
-    model = compiled(one)
+    model = looped_model(one)
     every = structure_of(pack(model.scene, None).system, {}, floors=[1e-9] * 20)[0]
     left = structure_of(model.packed_scene.system, {}, floors=model.packed_scene.floors)[0]
     assert (len(every.rows), len(left.rows)) == ((5, 2) if scene == "four-bar" else (10, 4))
@@ -203,7 +200,7 @@ def test_rows_that_nothing_moves_cost_nothing(scene: str) -> None:
 
 def test_wide_loops_stay_looped() -> None:
     """Five rows pass every link of Bricard's ring."""
-    model = compiled(bricard())
+    model = looped_model(bricard())
     for most, wanted in ((9, ""), (8, "like 9 bodies")):
         assert wanted in Fusion(model.packed_scene, {}, {}, most=most).obstacle
         assert bool(wanted) == bool(Fusion(model.packed_scene, {}, {}, most=most).obstacle)

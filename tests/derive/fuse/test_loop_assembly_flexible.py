@@ -8,11 +8,12 @@ import pytest
 import mstmm
 from tests.reference.compare import worst
 from tests.reference.flexible import random_beams
+from tests.support.models import compile_scene, looped_model
 from tests.system.loops.test_flexible_against_particles import closed
 from tests.system.loops.test_flexible_against_tree import SCENES, shackled, slider_crank
 from tests.system.loops.test_flexible_constraints import ROWS, bladed
 
-from .test_loop_assembly import AGREEMENT, TIME, compiled, interpreted, settled
+from .test_loop_assembly import AGREEMENT, TIME, interpreted, settled
 
 
 def agree(model: mstmm.Model, rng: np.random.Generator) -> None:
@@ -26,7 +27,7 @@ def agree(model: mstmm.Model, rng: np.random.Generator) -> None:
 @pytest.mark.parametrize("name", SCENES)
 def test_loops_of_hinges(name: str, rng: np.random.Generator) -> None:
     """Rows that pass a body, end on it, and close on its own frame."""
-    agree(compiled(SCENES[name][0]()), rng)
+    agree(looped_model(SCENES[name][0]()), rng)
 
 
 @pytest.mark.parametrize("name", ROWS)
@@ -39,14 +40,14 @@ def test_constraints_and_couplings(name: str, rng: np.random.Generator) -> None:
 def test_random_chains(seed: int, rng: np.random.Generator) -> None:
     """Any frame, any end held, sections within."""
     tree = random_beams.random_system(seed, most=3, chain=True)
-    agree(compiled(closed(tree, seed)[0]), rng)
+    agree(looped_model(closed(tree, seed)[0]), rng)
 
 
 @pytest.fixture(scope="module", params=[slider_crank, shackled], ids=["crank", "shackle"])
 def both(request: pytest.FixtureRequest) -> tuple[mstmm.Model, mstmm.Model]:
     """What closes by the looped engine and by code of its own."""
     scene = request.param()
-    return compiled(scene), compiled(scene, "fused")
+    return looped_model(scene), compile_scene(scene, "fused")
 
 
 @pytest.mark.parametrize("away", [1e-9, 1e-6, 1e-4])

@@ -15,6 +15,7 @@ from tests.reference import random_scenes
 from tests.reference.compare import fresh, worst
 from tests.reference.jets import Array
 from tests.reference.tree import SIZES
+from tests.support.draws import draws
 
 AGREEMENT = 1e-13
 TIME = 0.3
@@ -52,7 +53,7 @@ def interpreted(model: mstmm.Model, q: Array, u: Array) -> dict[str, Any]:
     return evaluate_floats(kernel, inputs)
 
 
-@pytest.mark.parametrize("draw", range(25))
+@pytest.mark.parametrize("draw", draws(8, 25))
 def test_interpreted_equals_looped(draw: int, rng: Generator) -> None:
     scene, q, u = fresh(rng)
     model = mstmm.compile(mstmm.Scene(**scene), engine="looped")

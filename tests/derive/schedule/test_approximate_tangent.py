@@ -18,6 +18,7 @@ import mstmm
 from mstmm.runtime.engine.tangent_matrix import TangentMatrix
 from tests.reference import random_scenes
 from tests.reference.jets import Array
+from tests.support.draws import draws
 from tests.support.scenes import random_flexible as engine_scenes
 
 TIME = 0.3
@@ -99,6 +100,6 @@ def test_solution_of_rigid_trees(most: int, rng: Generator) -> None:
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
-@pytest.mark.parametrize("draw", range(10))
+@pytest.mark.parametrize("draw", draws(4, 10))
 def test_solution_of_flexible_trees(draw: int, rng: Generator) -> None:
     check(*engine_scenes.drawn(int(rng.integers(2**32)), draw % 2 == 0, 3), rng)

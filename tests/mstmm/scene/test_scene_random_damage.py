@@ -81,7 +81,7 @@ def check(make: Any) -> None:
 SLOW = (HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.function_scoped_fixture)
 
 
-@settings(max_examples=400, deadline=None, suppress_health_check=SLOW)
+@settings(max_examples=150, deadline=None, suppress_health_check=SLOW)
 @given(st.data())
 def test_damaged_scenes(draw: st.DataObject) -> None:
     data = damaged(arm(), draw)
@@ -112,7 +112,7 @@ def test_the_flexible_scene_is_one() -> None:
     assert Scene(**flexible()).warnings == ()
 
 
-@settings(max_examples=300, deadline=None, suppress_health_check=SLOW)
+@settings(max_examples=100, deadline=None, suppress_health_check=SLOW)
 @given(st.data())
 def test_damaged_flexible_scenes(draw: st.DataObject) -> None:
     data = damaged(flexible(), draw)

@@ -7,14 +7,13 @@ is four particles at (+-a, 0) and (0, +-b) that carry its mass and its two momen
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.polynomial import Polynomial
-from numpy.typing import NDArray
 
 from tests.reference.algebra import orientation
 from tests.reference.jets import Array
@@ -182,27 +181,19 @@ class Shapes:
         By matrices: R = 1 + A1 + A2, A1 = theta~, R' = R kappa~ gives A2' = A1 theta'~; the axis
         follows by r' = (1 + s') R e_x.  R = exp(Psi~) leaves the rotation vector in A2 - A1 A1/2.
         """
-        turned = [_tilde_of(self._rotation_of(k)) for k in range(self.n)]
-        stretch = [self._field(k, 0).deriv() for k in range(self.n)]
-        out = np.zeros((40, 6, self.n, self.n))
-        for k, m in np.ndindex(self.n, self.n):
-            both = turned[k] @ _each(turned[m], Polynomial.deriv)
-            both = both + turned[m] @ _each(turned[k], Polynomial.deriv)
-            square = turned[k] @ turned[m] + turned[m] @ turned[k]
-            grown = _each(both, Polynomial.integ)
-            grown = grown + _each(square, lambda p: Polynomial([p(0.0) / 2]))
-            along = [
-                grown[a, 0] + stretch[k] * turned[m][a, 0] + stretch[m] * turned[k][a, 0]
-                for a in range(3)
-            ]
-            rest = grown - _each(square, lambda p: p / 2)
-            fields = [
-                *(p.integ() for p in along),
-                *((rest[c, b] - rest[b, c]) / 2 for b, c in ((1, 2), (2, 0), (0, 1))),
-            ]
-            for row, field in enumerate(fields):
-                out[: len(field.coef), row, k, m] = field.coef
-        return out
+        turned, stretch = np.zeros((self.n, 3, 3, _LENGTH)), np.zeros((self.n, _LENGTH))
+        for k in range(self.n):
+            turned[k] = _tilde_of(self._rotation_of(k))
+            stretch[k] = _padded(self._field(k, 0).deriv())
+        both = _symmetric_product(turned, _derivative(turned))
+        square = _symmetric_product(turned, turned)
+        grown = _integral(both)
+        grown[..., 0] += square[..., 0] / 2
+        along = grown[:, :, :, 0] + _stretched(stretch, turned[:, :, 0])
+        rest = grown - square / 2
+        turn = [(rest[:, :, c, b] - rest[:, :, b, c]) / 2 for b, c in ((1, 2), (2, 0), (0, 1))]
+        fields = np.concatenate([_integral(along), np.stack(turn, axis=2)], axis=2)
+        return np.moveaxis(fields, (3, 2), (0, 1))
 
     def _field(self, k: int, row: int) -> Polynomial:
         """Row s, v, w or psi of mode k, the frame's motion taken off."""
@@ -282,14 +273,55 @@ def tilde(vectors: Array) -> Array:
     return np.cross(vectors.T[:, None, :], np.eye(3)[None], axisb=2).swapaxes(1, 2)
 
 
-def _tilde_of(vector: list[Polynomial]) -> NDArray[np.object_]:
-    x, y, z = vector
-    none = Polynomial([0.0])
-    return np.array([[none, -z, y], [z, none, -x], [-y, x, none]], dtype=object)
+#: Coefficients of every polynomial here: more than any product of two fields has.
+_LENGTH = 40
 
 
-def _each(matrix: NDArray[np.object_], change: Callable[[Polynomial], Any]) -> NDArray[np.object_]:
-    return np.array([[change(p) for p in row] for row in matrix], dtype=object)
+def _padded(polynomial: Polynomial) -> Array:
+    """Coefficients with zeros up to the common length."""
+    return np.pad(polynomial.coef, (0, _LENGTH - len(polynomial.coef)))
+
+
+def _tilde_of(vector: list[Polynomial]) -> Array:
+    """Coefficients (3, 3, degree + 1) of the cross product with a vector of polynomials."""
+    x, y, z = map(_padded, vector)
+    none = np.zeros(_LENGTH)
+    return np.array([[none, -z, y], [z, none, -x], [-y, x, none]])
+
+
+def _derivative(polynomials: Array) -> Array:
+    return np.pad(
+        polynomials[..., 1:] * np.arange(1, _LENGTH), [(0, 0)] * (polynomials.ndim - 1) + [(0, 1)]
+    )
+
+
+def _integral(polynomials: Array) -> Array:
+    """Integral from 0; the last coefficient is zero and is left out."""
+    found = np.zeros_like(polynomials)
+    found[..., 1:] = polynomials[..., :-1] / np.arange(1, _LENGTH)
+    return found
+
+
+def _product(pairing: str, left: Array, right: Array) -> Array:
+    """Products of polynomials, whose factors are paired as in `np.einsum`."""
+    found = 0.0 * np.einsum(pairing, left[..., 0], right)
+    for power in range(_LENGTH):
+        if left[..., power].any():
+            term = np.einsum(pairing, left[..., power], right[..., : _LENGTH - power])
+            found[..., power:] += term
+    return np.asarray(found)
+
+
+def _symmetric_product(left: Array, right: Array) -> Array:
+    """left_k right_m + left_m right_k of matrices (n, 3, 3) of polynomials."""
+    pairs = _product("kab,mbcj->kmacj", left, right)
+    return pairs + pairs.swapaxes(0, 1)
+
+
+def _stretched(stretch: Array, column: Array) -> Array:
+    """s_k c_m + s_m c_k of scalars (n,) and columns (n, 3) of polynomials."""
+    pairs = _product("k,maj->kmaj", stretch, column)
+    return pairs + pairs.swapaxes(0, 1)
 
 
 def _symmetric(pairs: Array) -> Array:

@@ -7,24 +7,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-import mstmm
 from tests.reference import kane, laws, random_scenes
 from tests.reference import newton_euler as dense
 from tests.reference.compare import drawn, fresh, worst
 from tests.reference.jets import Array
 from tests.reference.tree import SIZES, read
+from tests.support.models import compile_scene
 
 ACCURACY = 1e-11
 TIME = 0.3
 
 
-def compiled(scene: dict[str, Any]) -> mstmm.Model:
-    return mstmm.compile(mstmm.Scene(**scene))
-
-
 def compare(scene: dict[str, Any], q: Array, u: Array) -> None:
     """Accelerations, hinge loads, efforts, energy and momentum of one state."""
-    model, found = compiled(scene), dense.solve(scene, q, u, TIME)
+    model, found = compile_scene(scene), dense.solve(scene, q, u, TIME)
     assert worst(model.accelerations(q, u, t=TIME), found.udot) < ACCURACY
     result = model.simulate(t_start=TIME, t_end=TIME, initial=(q, u))
     assert result.success, result.message
@@ -62,7 +58,7 @@ def test_chains_of_one_type(kind: str, rng: np.random.Generator) -> None:
 def test_mass_matrix(seed: int) -> None:
     scene = random_scenes.random_scene(seed)
     q, _ = random_scenes.random_state(scene, seed)
-    assert worst(compiled(scene).mass_matrix(q), dense.mass_matrix(scene, q)) < ACCURACY
+    assert worst(compile_scene(scene).mass_matrix(q), dense.mass_matrix(scene, q)) < ACCURACY
 
 
 @pytest.mark.parametrize("seed", range(50, 60))
@@ -71,7 +67,7 @@ def test_forward_after_inverse_dynamics_is_the_identity(
 ) -> None:
     scene = random_scenes.random_scene(seed)
     q, u = random_scenes.random_state(scene, seed)
-    model = compiled(scene)
+    model = compile_scene(scene)
     asked = rng.uniform(-2, 2, len(u))
     efforts = model.inverse_dynamics(q, u, asked, TIME)
     again = model.accelerations(q, u, TIME, efforts)
@@ -104,7 +100,7 @@ CHAINS = {
 @pytest.mark.parametrize("types", CHAINS, ids="-".join)
 def test_kane(types: tuple[str, ...]) -> None:
     scene = random_scenes.aligned_chain(5, types, springs=CHAINS[types])
-    solve, model = kane.accelerations(scene), compiled(scene)
+    solve, model = kane.accelerations(scene), compile_scene(scene)
     for seed in range(3):
         q, u = random_scenes.random_state(scene, seed)
         assert worst(model.accelerations(q, u), solve(q, u)) < 1e-12

@@ -15,14 +15,11 @@ from tests.reference import newton_euler as dense
 from tests.reference.compare import fresh
 from tests.reference.jets import Array
 from tests.reference.tree import SIZES, read
+from tests.support.models import looped_model
 from tests.support.scenes.random_flexible import dressed
 
 #: Relative residual of a scaled system whose condition is 1; it may grow with the condition.
 ACCURACY = 1e-13
-
-
-def compiled(scene: dict[str, Any]) -> mstmm.Model:
-    return mstmm.compile(mstmm.Scene(**scene), engine="looped")
 
 
 def built(scene: dict[str, Any]) -> mstmm.Model:
@@ -55,7 +52,7 @@ def check(matrix: Array, columns: Array, answers: Array, free: NDArray[np.bool_]
 @pytest.mark.parametrize("draw", range(6))
 def test_random_trees_against_the_dense_mass_matrix(draw: int, rng: Generator) -> None:
     scene, q, _ = fresh(rng)
-    model = compiled(scene)
+    model = looped_model(scene)
     columns = rng.standard_normal((model.nu, 4))
     check(dense.mass_matrix(scene, q), columns, model.solve(q, columns), free_speeds(scene))
 
@@ -63,7 +60,7 @@ def test_random_trees_against_the_dense_mass_matrix(draw: int, rng: Generator) -
 @pytest.mark.parametrize("kind", SIZES)
 def test_chains_of_one_type(kind: str, rng: Generator) -> None:
     scene, q, _ = fresh(rng, types=(kind,), chain=True, most=4)
-    model = compiled(scene)
+    model = looped_model(scene)
     columns = rng.standard_normal((model.nu, 3))
     check(dense.mass_matrix(scene, q), columns, model.solve(q, columns), free_speeds(scene))
 
@@ -71,7 +68,7 @@ def test_chains_of_one_type(kind: str, rng: Generator) -> None:
 @pytest.mark.parametrize("draw", range(2))
 def test_compiled_code_gives_the_same(draw: int, rng: Generator) -> None:
     scene, q, _ = fresh(rng, most=5)
-    looped, fused = compiled(scene), built(scene)
+    looped, fused = looped_model(scene), built(scene)
     columns = rng.standard_normal((looped.nu, 11))  # more than a group of lanes
     answers = fused.solve(q, columns)
     check(dense.mass_matrix(scene, q), columns, answers, free_speeds(scene))
@@ -81,7 +78,7 @@ def test_compiled_code_gives_the_same(draw: int, rng: Generator) -> None:
 def test_flexible_bodies_by_both_engines(rng: Generator) -> None:
     """Sections inward and outward, idle ends, drag and springs that must not be felt."""
     scene = dressed(int(rng.integers(2**32)), most=3)
-    looped, fused = compiled(scene), built(scene)
+    looped, fused = looped_model(scene), built(scene)
     q = looped.initial_state()[0]
     matrix = looped.mass_matrix(q)
     columns = rng.standard_normal((looped.nu, 3))
@@ -95,7 +92,7 @@ def test_flexible_bodies_by_both_engines(rng: Generator) -> None:
 def test_it_is_the_derivative_of_accelerations_by_efforts(rng: Generator) -> None:
     """Loads, laws, speeds and time have no part in it."""
     scene, q, u = fresh(rng)
-    model = compiled(scene)
+    model = looped_model(scene)
     found = model.solve(q, np.eye(model.nu))
     expected = model.derivatives(q, u, 0.3).efforts
     size = np.sqrt(np.maximum(np.diag(expected), np.finfo(float).tiny))
@@ -122,7 +119,7 @@ ARM: dict[str, Any] = {
 
 
 def test_shapes_are_those_of_numpy() -> None:
-    model, q = compiled(ARM), np.array([[0.1, 0.2], [0.3, -1.0], [0.0, 2.0]])
+    model, q = looped_model(ARM), np.array([[0.1, 0.2], [0.3, -1.0], [0.0, 2.0]])
     matrices = model.mass_matrix(q)
     one, many = np.array([1.0, -2.0]), np.arange(6.0).reshape(2, 3)
     np.testing.assert_allclose(model.solve(q[0], one), np.linalg.solve(matrices[0], one))
@@ -149,13 +146,13 @@ def test_shapes_are_those_of_numpy() -> None:
 )
 def test_what_does_not_fit_is_said(rhs: Any, said: str) -> None:
     with pytest.raises(mstmm.SceneError) as error:
-        compiled(ARM).solve([0.0, 0.0], rhs)
+        looped_model(ARM).solve([0.0, 0.0], rhs)
     assert str(error.value) == said
 
 
 def test_shapes_that_do_not_fit_are_told_as_they_were_given() -> None:
     with pytest.raises(mstmm.SceneError, match=r"q \(3, 2\), rhs \(4, 2, 5\)"):
-        compiled(ARM).solve(np.zeros((3, 2)), np.zeros((4, 2, 5)))
+        looped_model(ARM).solve(np.zeros((3, 2)), np.zeros((4, 2, 5)))
 
 
 def test_a_motion_without_inertia_is_named_by_both_engines() -> None:
@@ -169,7 +166,7 @@ def test_a_motion_without_inertia_is_named_by_both_engines() -> None:
     wind = {"on": "rod", "force": ["1/t", 0, 0]}
     scene = {"schema_version": 1, "gravity": [0, 0, 0], "body": [rod], "hinge": [joint],
              "load": [wind]}  # fmt: skip
-    for model in (compiled(scene), built(scene)):
+    for model in (looped_model(scene), built(scene)):
         assert model.solve([0.0, 1.0], [1.0, 1.0]).shape == (2,)
         with pytest.raises(mstmm.NumericalFailure, match=r'hinge "cross".*undetermined'):
             model.solve([0.0, 0.0], np.eye(2))

@@ -17,6 +17,7 @@ from mstmm.errors import NumericalFailure
 from mstmm.runtime.engine.tangent_matrix import TangentMatrix
 from tests.reference import random_scenes
 from tests.reference.jets import Array
+from tests.support.draws import draws
 from tests.support.scenes import random_flexible as engine_scenes
 
 TIME, SHARE = 0.3, 1.0
@@ -125,7 +126,7 @@ def test_direction_of_rigid_trees(draw: int, rng: Generator) -> None:
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
-@pytest.mark.parametrize("draw", range(8))
+@pytest.mark.parametrize("draw", draws(4, 8))
 def test_direction_of_flexible_trees(draw: int, rng: Generator) -> None:
     """Beams with drag, points of quadrature, drives, loads on sections."""
     check_direction(*flexible(rng, draw % 2 == 0), rng)
@@ -143,12 +144,12 @@ def test_solution_of_trees_of_many_tiles(draw: int, rng: Generator) -> None:
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
-@pytest.mark.parametrize("draw", range(12))
+@pytest.mark.parametrize("draw", draws(4, 12))
 def test_solution_of_flexible_trees(draw: int, rng: Generator) -> None:
     check_solution(*flexible(rng, draw % 2 == 0), rng)
 
 
-@pytest.mark.parametrize("draw", range(4))
+@pytest.mark.parametrize("draw", draws(2, 4))
 def test_direction_by_derivatives_of_accelerations(draw: int, rng: Generator) -> None:
     """Where R = 0 its derivatives are those of the accelerations times -M, found by other code."""
     scene, q, u = rigid(rng)

@@ -9,7 +9,7 @@ import pytest
 
 import mstmm
 from tests.runtime.model.test_equilibrium_closed_loops import five_bar
-from tests.runtime.packing.loops.test_cut_tree import compiled
+from tests.support.models import compile_scene
 from tests.support.scenes.linkages import angles, four_bar
 
 OMEGA = np.array([0.7, 3.0, 11.0, 40.0])
@@ -40,7 +40,7 @@ def on_a_platform(cut: str) -> dict[str, Any]:
 def test_a_platform_that_moves_is_a_ground_that_moves(cut: str) -> None:
     """Coordinates answer to a motion as to the acceleration of the ground that it is."""
     outputs = ["foot.angle", "tip.angle_rate", "end.angle_acceleration"]
-    moved, still = compiled(on_a_platform(cut)), compiled(sprung(cut))
+    moved, still = compile_scene(on_a_platform(cut)), compile_scene(sprung(cut))
     found = moved.frequency_response(OMEGA, ["road"], outputs).response
     pushed = still.frequency_response(OMEGA, ["ground.acceleration.y"], outputs).response
     wanted = -(OMEGA**2)[:, None, None] * pushed
@@ -66,7 +66,7 @@ def turned(value: float, *rates: float, cut: str = "top") -> mstmm.Model:
         link["initial"] = {"q": -link["initial"]["q"]}
         crank["cut"] = True
     turn = {"name": "turn", "unit": "rad", "value": value, "rates": list(rates)}
-    return compiled(scene | {"input": [turn]})
+    return compile_scene(scene | {"input": [turn]})
 
 
 @pytest.fixture(scope="module")
@@ -133,6 +133,8 @@ def test_a_driven_crank_leaves_nothing_but_kinematics() -> None:
     scene = four_bar(0.6)
     scene["hinge"][0] |= {"drive": "turn", "initial": {}}
     turn = {"name": "turn", "unit": "rad", "value": 0.6, "rates": [0, 0]}
-    found = compiled(scene | {"input": [turn]}).frequency_response([2.0], ["turn"], ["end.angle"])
+    found = compile_scene(scene | {"input": [turn]}).frequency_response(
+        [2.0], ["turn"], ["end.angle"]
+    )
     slope = (angles(0.6 + 1e-4)[1] - angles(0.6 - 1e-4)[1]) / 2e-4
     assert abs(found.response[0, 0, 0] - slope) < 1e-7

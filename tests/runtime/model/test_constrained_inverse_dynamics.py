@@ -14,8 +14,9 @@ from tests.reference.compare import worst
 from tests.reference.jets import Array
 from tests.reference.random_loops import random_mechanism, torn
 from tests.reference.tree import read
-from tests.runtime.packing.loops.test_cut_tree import LAWS, SPEED, compiled, signs
+from tests.runtime.packing.loops.test_cut_tree import LAWS, SPEED, signs
 from tests.support import planar_four_bar as planar
+from tests.support.models import compile_scene
 from tests.support.scenes.linkages import OBLIQUE, bricard, four_bar, legs
 from tests.support.scenes.published_mechanisms import four_bars
 
@@ -30,7 +31,7 @@ def ways_of_four_bar(found: Array) -> Array:
 
 @pytest.mark.parametrize("cut", planar.NAMES)
 def test_mass_matrix_of_a_four_bar(cut: str) -> None:
-    model = compiled(four_bar(speed=SPEED, cut=cut, laws=LAWS, tilt=OBLIQUE))
+    model = compile_scene(four_bar(speed=SPEED, cut=cut, laws=LAWS, tilt=OBLIQUE))
     assert model.loops.independent_speeds == ("foot.angle_rate",)
     found, rates = planar.start(0.9, SPEED)
     along = ways_of_four_bar(found)
@@ -43,7 +44,7 @@ def test_random_mechanisms(seed: int) -> None:
     """Mass matrices by a null space from singular values and the kinetic energy of all bodies, and
     efforts that give the accelerations for which they were asked."""
     scene, q, u = random_mechanism(seed)
-    model, tree = compiled(scene), read(scene)
+    model, tree = compile_scene(scene), read(scene)
     places = [
         model.coordinate_layout.u_names.index(name) for name in model.loops.independent_speeds
     ]
@@ -69,7 +70,7 @@ def test_random_mechanisms(seed: int) -> None:
 @pytest.mark.parametrize("cut", ["foot", "tip"])
 def test_any_pin_of_a_four_bar_acts(name: str, cut: str) -> None:
     """By virtual work the effort of a pin is that of the crank over how far it turns with it."""
-    model = compiled(four_bar(speed=SPEED, cut=cut, laws=LAWS))
+    model = compile_scene(four_bar(speed=SPEED, cut=cut, laws=LAWS))
     found, rates = planar.start(0.9, SPEED)
     crank = planar.effort_of_crank(found, rates, -3.0, LAWS)
     turns = planar.HINGES @ ways_of_four_bar(found)
@@ -84,7 +85,7 @@ def test_legs_carry_a_platform() -> None:
     scene = legs()
     for body in scene["body"][1:]:
         body["mass"], body["inertia"] = 1e-9, [1e-10, 1e-10, 1e-10]
-    model = compiled(scene)
+    model = compile_scene(scene)
     q, u = model.initial_state()
     slides = [f"slide{k}" for k in range(6)]
     efforts = model.inverse_dynamics(q, u, np.zeros(6), actuators=slides)
@@ -106,7 +107,7 @@ def test_efforts_of_drives(cut: str) -> None:
     scene = four_bar(cut=cut, foot=drive)
     for hinge in scene["hinge"]:
         hinge["initial"] = {} if "drive" in hinge else hinge["initial"]
-    model = compiled(scene)
+    model = compile_scene(scene)
     q, u = model.initial_state()
     efforts = model.inverse_dynamics(q, u, np.zeros(0))
     found, rates = planar.start(0.9, 2.0)
@@ -116,7 +117,7 @@ def test_efforts_of_drives(cut: str) -> None:
 
 def test_columns_of_efforts() -> None:
     """M^-1 of a mechanism: N (N^T M N)^-1 N^T."""
-    model = compiled(legs())
+    model = compile_scene(legs())
     q, _ = model.initial_state()
     columns = np.random.default_rng(1).standard_normal((model.nu, 3))
     found = model.solve(q, columns)
@@ -139,14 +140,14 @@ REFUSED: dict[str, tuple[list[str], str]] = {
 @pytest.mark.parametrize("what", REFUSED)
 def test_refused_actuators(what: str) -> None:
     names, message = REFUSED[what]
-    model = compiled(four_bar())
+    model = compile_scene(four_bar())
     q, u = model.initial_state()
     with pytest.raises(mstmm.SceneError, match=message):
         model.inverse_dynamics(q, u, [0.0], actuators=names)
 
 
 def test_accelerations_that_tear_a_loop() -> None:
-    model = compiled(four_bar())
+    model = compile_scene(four_bar())
     q, u = model.initial_state()
     with pytest.raises(mstmm.SceneError, match=r"udot of .* where closed loops need"):
         model.inverse_dynamics(q, u, np.ones(4))
@@ -155,7 +156,7 @@ def test_accelerations_that_tear_a_loop() -> None:
 def test_a_dead_centre() -> None:
     """Where coupler and crank are in line the rocker turns round and cannot move them."""
     line = np.arccos((1.6**2 + 1.2**2 - 0.8**2) / (2 * 1.6 * 1.2))
-    model = compiled(four_bar(crank=float(line)))
+    model = compile_scene(four_bar(crank=float(line)))
     q, u = model.initial_state()
     assert np.isfinite(model.inverse_dynamics(q, u, [1.0])).all()
     with pytest.raises(
@@ -166,7 +167,7 @@ def test_a_dead_centre() -> None:
 
 def test_a_singular_pose() -> None:
     """Windows that are folded flat can go on more ways than one."""
-    model = compiled(four_bars(2, 0.0, 0.0))
+    model = compile_scene(four_bars(2, 0.0, 0.0))
     assert model.loops.singular
     with pytest.raises(mstmm.NumericalFailure, match="singular configuration; use a nearby state"):
         model.mass_matrix(model.initial_state()[0])
@@ -175,7 +176,7 @@ def test_a_singular_pose() -> None:
 def test_actuators_of_a_tree() -> None:
     scene = bricard()
     scene["hinge"].pop()
-    model = compiled(scene)
+    model = compile_scene(scene)
     q, u = model.initial_state()
     with pytest.raises(mstmm.SceneError, match="actuators: expected a scene with closed loops"):
         model.inverse_dynamics(q, u, u, actuators=["pin0"])

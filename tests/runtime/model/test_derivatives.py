@@ -21,14 +21,11 @@ from tests.reference.compare import drawn, fresh, worst
 from tests.reference.jets import Array
 from tests.reference.tree import SIZES
 from tests.support.kernels.complex_arithmetic import complex_step
+from tests.support.models import compile_scene
 
 TIME = 0.3
 MOVING = tuple(name for name in SIZES if name != "fixed")
 Arrays = dict[str, Any]
-
-
-def compiled(scene: dict[str, Any]) -> mstmm.Model:
-    return mstmm.compile(mstmm.Scene(**scene))
 
 
 def equations(model: mstmm.Model, q: Array, u: Array) -> tuple[KernelIR, Arrays]:
@@ -74,7 +71,7 @@ def fifty_digits(kernel: KernelIR, inputs: Arrays, port: str, direction: Array) 
 def test_fifty_digits(seed: int) -> None:
     """All hinge types, laws, loads and springs, in trees: along a random direction."""
     scene, q, u = drawn(100 + seed, most=3)
-    model = compiled(scene)
+    model = compile_scene(scene)
     kernel, inputs = equations(model, q, u)
     draw = np.random.default_rng(seed).normal(size=model.nu)
     found = along(model.derivatives(q, u, TIME), draw)
@@ -86,7 +83,7 @@ def test_fifty_digits(seed: int) -> None:
 @pytest.mark.parametrize("draw", range(2))
 def test_complex_step_on_trees_drawn_afresh(draw: int, rng: np.random.Generator) -> None:
     scene, q, u = fresh(rng, most=5)
-    model = compiled(scene)
+    model = compile_scene(scene)
     kernel, inputs = equations(model, q, u)
     increment = rng.normal(size=model.nu)
     found = along(model.derivatives(q, u, TIME), increment)
@@ -99,7 +96,7 @@ def test_complex_step_on_trees_drawn_afresh(draw: int, rng: np.random.Generator)
 def test_complex_step_by_hinge_type(kind: str) -> None:
     """Two hinges of one type with every law, columns one by one."""
     scene, q, u = drawn(7, types=(kind,), most=2, chain=True)
-    model = compiled(scene)
+    model = compile_scene(scene)
     kernel, inputs = equations(model, q, u)
     found = model.derivatives(q, u, TIME)
     for k, unit in enumerate(np.eye(model.nu)):
@@ -113,7 +110,7 @@ def test_complex_step_by_hinge_type(kind: str) -> None:
 def test_the_independent_dense_equations(seed: int) -> None:
     """Differences of the dense Newton-Euler equations, which share nothing with mstmm."""
     scene, q, u = drawn(200 + seed, most=5)
-    model, step = compiled(scene), 1e-5
+    model, step = compile_scene(scene), 1e-5
     found = model.derivatives(q, u, TIME)
     size = max(1.0, float(np.abs(found.q).max()))
     for k, unit in enumerate(np.eye(model.nu)):
@@ -129,7 +126,7 @@ def test_the_independent_dense_equations(seed: int) -> None:
 
 def test_batches_are_states_one_by_one() -> None:
     scene, q, u = drawn(3, most=3)
-    model = compiled(scene)
+    model = compile_scene(scene)
     names = ["gravity[0]", f"{scene['body'][0]['name']}.mass"]
     states = np.stack([q, 1.1 * q, q]), np.stack([u, u, 2 * u])
     times = np.array([0.1, 0.2, 0.3])
@@ -149,7 +146,7 @@ def test_batches_are_states_one_by_one() -> None:
 def test_efforts_shift_the_point_of_a_nonlinear_law_not_the_slope() -> None:
     """Accelerations are affine in the efforts, whatever else acts."""
     scene, q, u = drawn(11, most=3)
-    model = compiled(scene)
+    model = compile_scene(scene)
     extra = np.random.default_rng(1).normal(size=model.nu)
     plain, pushed = model.derivatives(q, u, TIME), model.derivatives(q, u, TIME, efforts=extra)
     assert worst(pushed.efforts, plain.efforts) < 1e-12

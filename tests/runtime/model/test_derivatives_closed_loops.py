@@ -11,7 +11,8 @@ import mstmm
 from tests.reference.compare import worst
 from tests.reference.jets import Array
 from tests.runtime.linear.loops.test_constrained_linearisation import LAWS as SPRINGS
-from tests.runtime.packing.loops.test_cut_tree import LAWS, compiled
+from tests.runtime.packing.loops.test_cut_tree import LAWS
+from tests.support.models import compile_scene
 from tests.support.scenes.linkages import OBLIQUE, bricard, four_bar
 
 STEP = 1e-5
@@ -35,7 +36,7 @@ def ring() -> dict[str, Any]:
 )
 def test_along_closed_motions(scene: dict[str, Any]) -> None:
     """By central differences between states in which loops and speeds fit, at some speed."""
-    model = compiled(scene)
+    model = compile_scene(scene)
     q, speed = model.initial_state()[0], 1.7
     found = model.derivatives(q, speed * ways(model, q))
 
@@ -52,7 +53,7 @@ def test_along_closed_motions(scene: dict[str, Any]) -> None:
 
 
 def test_by_numbers_of_the_scene() -> None:
-    model = compiled(four_bar(speed=1.0, laws=LAWS))
+    model = compile_scene(four_bar(speed=1.0, laws=LAWS))
     q, u = model.initial_state()
     names = ["coupler.mass", "tip.law.stiffness[0]", "gravity[1]"]
     found = model.derivatives(q, u, parameters=names).parameters
@@ -67,9 +68,12 @@ def test_by_numbers_of_the_scene() -> None:
 def test_by_rotors() -> None:
     """Of hinges that stay in the tree, and of one that is cut and has a rotor: by differences.  The
     first rotor on a cut hinge has none, whether somebody chose the cut or not."""
-    cut = compiled(four_bar(speed=1.0, cut="tip"))
+    cut = compile_scene(four_bar(speed=1.0, cut="tip"))
     q, u = cut.initial_state()
-    for model in (cut, compiled(four_bar(speed=1.0, cut="tip", laws={"tip": {"inertia": 0.02}}))):
+    for model in (
+        cut,
+        compile_scene(four_bar(speed=1.0, cut="tip", laws={"tip": {"inertia": 0.02}})),
+    ):
         for name in (f"{hinge}.law.inertia[0]" for hinge in ("foot", "knee", "end", "tip")):
             value = model.parameters[name]
             if name.startswith("tip") and not value:
@@ -85,7 +89,7 @@ def test_by_rotors() -> None:
     scene = four_bar(speed=1.0)
     for hinge in scene["hinge"]:
         del hinge["cut"]
-    model = compiled(scene)
+    model = compile_scene(scene)
     (chosen,) = model.loops.cut_hinges
     with pytest.raises(mstmm.errors.SceneError, match=f'cut hinge "{chosen}" is zero'):
         model.derivatives(q, u, parameters=[f"{chosen}.law.inertia[0]"])
@@ -93,7 +97,7 @@ def test_by_rotors() -> None:
 
 def test_those_of_linear_models() -> None:
     """At rest, along the independent motion: -M^-1 K and -M^-1 C."""
-    model = compiled(four_bar(laws=SPRINGS, tilt=OBLIQUE))
+    model = compile_scene(four_bar(laws=SPRINGS, tilt=OBLIQUE))
     linear = model.linearize()
     assert linear.constrained_motion is not None
     along, places = linear.constrained_motion.motion_basis, list(linear.free_speed_indices)

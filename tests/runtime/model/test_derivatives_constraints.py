@@ -11,11 +11,11 @@ import pytest
 import mstmm
 from tests.reference.compare import worst
 from tests.reference.jets import Array
+from tests.support.models import compile_scene
 from tests.support.scenes.constraints import (
     GRAVITY,
     MASS,
     RADIUS,
-    compiled,
     cycloid,
     governor,
     on_a_plane,
@@ -30,7 +30,7 @@ SCENES = {"distances": governor("constraint"), "plane": on_a_plane(), "disc": on
 @pytest.mark.parametrize("name", SCENES)
 def test_along_closed_motions(name: str) -> None:
     """By central differences between states of the same independent speeds and others."""
-    model, draw = compiled(SCENES[name]), np.random.default_rng(4)
+    model, draw = compile_scene(SCENES[name]), np.random.default_rng(4)
     freedom, closed = model.independent_speeds, model.loop_start
     assert freedom is not None and closed is not None
     q, places = model.initial_state()[0], freedom.indices
@@ -54,7 +54,7 @@ def test_along_closed_motions(name: str) -> None:
 
 def test_by_numbers_of_the_scene() -> None:
     """The mass of the disc and gravity."""
-    model = compiled(on_a_road())
+    model = compile_scene(on_a_road())
     q, u = model.initial_state()
     names = ["disc.mass", "gravity[2]"]
     found = model.derivatives(q, u, parameters=names).parameters
@@ -68,9 +68,9 @@ def test_by_numbers_of_the_scene() -> None:
 
 def test_by_numbers_of_constraints() -> None:
     """The radius of the disc, which begins at rest as no speed goes with all radii."""
-    scene, (q, u) = on_a_road(), compiled(on_a_road()).initial_state()
+    scene, (q, u) = on_a_road(), compile_scene(on_a_road()).initial_state()
     del scene["hinge"][0]["initial"]["u"]
-    model = compiled(scene)
+    model = compile_scene(scene)
     found = model.derivatives(q, u, parameters=["road.radius"]).parameters["road.radius"]
     sides = [model.with_parameters({"road.radius": RADIUS + s}).accelerations(q, u)
              for s in (STEP, -STEP)]  # fmt: skip
@@ -85,7 +85,7 @@ def test_by_numbers_of_constraints() -> None:
 def test_lengths_are_numbers_of_the_scene() -> None:
     """Rods of 0.31 m from arms of 0.3 m to the sleeve below."""
     longer = {f"constraint{k}.length": 0.31 for k in (1, 2)}
-    arms = compiled(SCENES["distances"]).with_parameters(longer)
+    arms = compile_scene(SCENES["distances"]).with_parameters(longer)
     q, places = arms.initial_state()[0], arms.coordinate_layout.hinges
     arm = 0.3 * np.exp(1j * q[places["hip0"].q])
     below = arm.imag + math.sqrt(0.31**2 - arm.real**2)
@@ -106,7 +106,7 @@ def gimballed() -> mstmm.Model:
     ]  # fmt: skip
     hinges[-1]["outboard"] = "disc"
     hinges[2]["initial"] = {"q": RADIUS}
-    return compiled(on_a_road() | {
+    return compile_scene(on_a_road() | {
         "body": [*bodies, {"name": "disc", "mass": MASS, "inertia": inertia}], "hinge": hinges,
     })  # fmt: skip
 

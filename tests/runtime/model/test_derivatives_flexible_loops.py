@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import mstmm
-from tests.derive.fuse.test_loop_assembly import compiled
 from tests.reference.compare import worst
 from tests.reference.jets import Array
+from tests.support.models import looped_model
 from tests.system.loops.test_flexible_against_tree import Scene, shackled, slider_crank
 
 #: Of closed states beside the one at hand, and of speeds there; halved once.
@@ -31,7 +31,7 @@ def by_differences(side: Callable[[float], list[Array]], step: float) -> list[Ar
 @pytest.mark.parametrize("scene", [slider_crank, shackled], ids=["crank", "shackle"])
 def test_along_closed_motions(scene: Callable[[], Scene], rng: np.random.Generator) -> None:
     """In motion, along every independent motion and speed."""
-    model = compiled(scene())
+    model = looped_model(scene())
     freedom, q, u = model.independent_speeds, *model.initial_state()
     assert freedom is not None
     places = freedom.indices
@@ -56,7 +56,7 @@ def test_along_closed_motions(scene: Callable[[], Scene], rng: np.random.Generat
 
 
 def test_by_numbers_of_the_scene() -> None:
-    model = compiled(slider_crank())
+    model = looped_model(slider_crank())
     q, u = model.initial_state()
     names = ["slider.mass", "gravity[1]", "crank.mass"]
     found = model.derivatives(q, u, parameters=names).parameters
@@ -74,7 +74,7 @@ def test_those_of_linear_models(scene: Callable[[], Scene]) -> None:
     """At rest, bent by weight: -M^-1 K and -M^-1 C along the independent motions."""
     made = scene()
     made["beam"][0]["damping"] = 0.03
-    model: mstmm.Model = compiled(made)
+    model: mstmm.Model = looped_model(made)
     linear = model.linearize()
     assert linear.constrained_motion is not None
     along, places = linear.constrained_motion.motion_basis, list(linear.free_speed_indices)

@@ -7,16 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-import mstmm
 from mstmm.errors import NumericalFailure, SceneError
 from mstmm.runtime.engine.tangent_matrix import TangentMatrix
 from tests.reference.compare import drawn, worst
 from tests.reference.jets import Array
 from tests.reference.random_scenes import random_scene
-
-
-def compiled(scene: dict[str, Any]) -> mstmm.Model:
-    return mstmm.compile(mstmm.Scene(**scene))
+from tests.support.models import compile_scene
 
 
 def pendulum(**hinge: Any) -> dict[str, Any]:
@@ -29,7 +25,7 @@ def pendulum(**hinge: Any) -> dict[str, Any]:
 @pytest.mark.parametrize("seed", range(4))
 def test_efforts_see_the_inverse_mass_matrix(seed: int) -> None:
     scene, q, u = drawn(300 + seed, most=5)
-    model = compiled(scene)
+    model = compile_scene(scene)
     inverse = model.derivatives(q, u).efforts
     assert worst(inverse, inverse.T, floor=1e-3) < 1e-12
     assert np.linalg.eigvalsh((inverse + inverse.T) / 2).min(initial=1.0) > 0
@@ -41,7 +37,7 @@ def test_driven_coordinates_do_not_answer() -> None:
     """Their row is the drive's alone; the others see the inverse of their own mass matrix."""
     scene = random_scene(5, types=("pin",), laws=False, loads=False, chain=True, most=4)
     scene["hinge"][0]["drive"] = "0.3*sin(2*t)"
-    model = compiled(scene)
+    model = compile_scene(scene)
     driven = model.coordinate_layout.hinges[scene["hinge"][0]["name"]].u
     free = [k for k in range(model.nu) if k != driven]
     q, u = model.initial_state()
@@ -68,7 +64,7 @@ def test_increments_of_quaternions_turn_with_the_body() -> None:
     """dphi' = domega - omega x dphi; dp' = dv - v x dphi - omega x dp, outboard axes."""
     scene = random_scene(2, types=("free", "ball"), laws=False, most=2)
     scene["hinge"][0]["type"] = "free"
-    model = compiled(scene)
+    model = compile_scene(scene)
     rng = np.random.default_rng(3)
     q, _ = model.initial_state()
     u = rng.normal(size=model.nu)
@@ -89,7 +85,7 @@ def test_increments_of_quaternions_turn_with_the_body() -> None:
 
 def test_the_length_of_a_quaternion_does_not_matter() -> None:
     scene, q, u = drawn(12, types=("ball", "free"), most=3)
-    model = compiled(scene)
+    model = compile_scene(scene)
     longer = q.copy()
     for start in model.coordinate_layout.quaternions:
         longer[start : start + 4] *= 1.7
@@ -100,7 +96,7 @@ def test_the_length_of_a_quaternion_does_not_matter() -> None:
 
 def test_small_oscillations_of_a_pendulum() -> None:
     """Frequency sqrt(m g l / J) and the damping ratio of a damped pin, J about the pin."""
-    model = compiled(pendulum(law={"damping": 0.4}))
+    model = compile_scene(pendulum(law={"damping": 0.4}))
     inertia = 0.3 + 2.0 * 0.25
     found = model.derivatives([-np.pi / 2], [0.0])
     assert abs(found.q[0, 0] + 2.0 * 9.81 * 0.5 / inertia) < 1e-13
@@ -117,7 +113,7 @@ def test_conservative_motions_near_equilibrium_neither_grow_nor_decay() -> None:
     for hinge in scene["hinge"]:
         count = {"universal": 2}.get(hinge["type"], 1)
         hinge["law"] = {"stiffness": [300.0] * count, "inertia": [0.0] * count}
-    model = compiled(scene)
+    model = compile_scene(scene)
     q = model.equilibrium()
     found = model.derivatives(q, np.zeros(model.nu))
     stiffness = model.mass_matrix(q) @ found.q
@@ -127,7 +123,7 @@ def test_conservative_motions_near_equilibrium_neither_grow_nor_decay() -> None:
 
 
 def test_scenes_without_coordinates() -> None:
-    model = compiled(pendulum(type="fixed"))
+    model = compile_scene(pendulum(type="fixed"))
     found = model.derivatives([], [], parameters=["rod.mass"])
     assert found.q.shape == (0, 0) and found.parameters["rod.mass"].shape == (0,)
     assert found.state_matrix.shape == (0, 0)
@@ -138,35 +134,35 @@ def test_scenes_without_coordinates() -> None:
 
 def test_an_unknown_name_suggests_the_nearest() -> None:
     with pytest.raises(SceneError, match=r'"rod\.mas": there is no such number.*"rod\.mass"'):
-        compiled(pendulum()).derivatives([0.0], [0.0], parameters=["rod.mas"])
+        compile_scene(pendulum()).derivatives([0.0], [0.0], parameters=["rod.mas"])
 
 
 def test_a_list_needs_an_index() -> None:
     with pytest.raises(SceneError, match=r'"rod\.center_of_mass": there is no such number'):
-        compiled(pendulum()).derivatives([0.0], [0.0], parameters=["rod.center_of_mass"])
+        compile_scene(pendulum()).derivatives([0.0], [0.0], parameters=["rod.center_of_mass"])
 
 
 def test_a_wrong_shape_is_named() -> None:
     with pytest.raises(SceneError, match=r"q has shape \(2,\), expected \(..., 1\)"):
-        compiled(pendulum()).derivatives([0.0, 1.0], [0.0])
+        compile_scene(pendulum()).derivatives([0.0, 1.0], [0.0])
 
 
 def test_a_slope_that_does_not_exist_is_a_failure() -> None:
-    model = compiled(pendulum(law={"effort": "sqrt(q)"}))
+    model = compile_scene(pendulum(law={"effort": "sqrt(q)"}))
     assert np.isfinite(model.accelerations([0.0], [0.0])).all()
     with pytest.raises(NumericalFailure, match=r"derivative of pin\.angle_rate's acceleration"):
         model.derivatives([0.0], [0.0])
 
 
 def test_a_release_is_refused() -> None:
-    model = compiled(pendulum(drive="0", release="t >= 1"))
+    model = compile_scene(pendulum(drive="0", release="t >= 1"))
     with pytest.raises(SceneError, match='hinge "pin" is released during the run'):
         model.derivatives([0.0], [0.0])
 
 
 def carried(scene: dict[str, Any]) -> tuple[list[int], list[int]]:
     """Parents of the bodies, and where the tangent carries their S while they wait."""
-    model = compiled(scene)
+    model = compile_scene(scene)
     TangentMatrix(model.looped)
     packed = model.looped.packed
     bodies = packed.model.bodies

@@ -10,7 +10,7 @@ from scipy.optimize import minimize_scalar
 
 import mstmm
 from mstmm.errors import NumericalFailure
-from tests.runtime.packing.loops.test_cut_tree import compiled
+from tests.support.models import compile_scene
 from tests.support.scenes.linkages import COUPLER, CRANK, angles, four_bar, rod
 
 GRAVITY, STIFFNESS = 9.81, 40.0
@@ -38,7 +38,7 @@ def energy(crank: float, rest: float) -> float:
 @pytest.mark.parametrize("start, rest", [(1.5, 6.0), (0.9, 3.5)])
 def test_the_rocker_turns_round_on_the_way(start: float, rest: float) -> None:
     """It is independent at the start, and tells nothing where crank and coupler are in line."""
-    model = compiled(on_a_spring(start, rest))
+    model = compile_scene(on_a_spring(start, rest))
     assert model.loops.independent_speeds == ("end.angle_rate",)
     found = model.equilibrium()
     names = list(model.coordinate_layout.hinges)
@@ -76,7 +76,7 @@ def five_bar(law: dict[str, float]) -> dict[str, Any]:
 
 def test_hinges_come_to_rest_within_half_a_turn() -> None:
     """Its way down winds three hinges up, which nothing counts."""
-    model = compiled(five_bar({}))
+    model = compile_scene(five_bar({}))
     start = model.initial_state()[0]
     found = model.equilibrium()
     assert np.abs(found - start).max() <= np.pi
@@ -85,8 +85,8 @@ def test_hinges_come_to_rest_within_half_a_turn() -> None:
 
 def test_turns_that_something_counts_stay() -> None:
     """A spring of 1e-6 N m/rad moves next to nothing, and has a turn of its own."""
-    model = compiled(five_bar({"stiffness": 1e-6}))
-    free = compiled(five_bar({}))
+    model = compile_scene(five_bar({"stiffness": 1e-6}))
+    free = compile_scene(five_bar({}))
     wound, found = model.equilibrium(), free.equilibrium()
     place = list(model.coordinate_layout.hinges).index("foot1")
     turns = (wound[place] - found[place]) / (2 * np.pi)
@@ -95,7 +95,7 @@ def test_turns_that_something_counts_stay() -> None:
 
 def test_a_coordinate_alone_resonates_by_name() -> None:
     """One coordinate has no condition beside itself, but what cancels in it."""
-    model = compiled(on_a_spring(0.9, 1.0))
+    model = compile_scene(on_a_spring(0.9, 1.0))
     linear = model.linearize(inputs=["foot.effort"])
     omega = linear.modes().omega[0] * (1 + 2e-16 * np.arange(3))
     for one in omega:
@@ -106,7 +106,7 @@ def test_a_coordinate_alone_resonates_by_name() -> None:
 
 
 def test_bodies_alone_carry_a_motion() -> None:
-    modes = compiled(on_a_spring(0.9, 1.0)).modes()
+    modes = compile_scene(on_a_spring(0.9, 1.0)).modes()
     assert set(modes.kinetic_energy_shares()) == {"crank", "coupler", "rocker"}
 
 

@@ -13,8 +13,8 @@ from mstmm import SceneError
 from tests.reference import newton_euler
 from tests.reference.compare import Drawn, fresh, worst
 from tests.reference.tree import read
+from tests.support.draws import draws
 
-COUNT = 12
 BEAM = {
     "name": "blade",
     "length": 2.0,
@@ -54,7 +54,7 @@ def jacobian(scene: dict[str, Any], q: Any, nu: int) -> Any:
     return np.stack([velocities(scene, q, unit) for unit in np.eye(nu)], axis=-1)
 
 
-@pytest.mark.parametrize("_", range(COUNT))
+@pytest.mark.parametrize("_", draws(4, 12))
 def test_places_velocities_and_jacobians(_: int, rng: np.random.Generator) -> None:
     scene, q, u = every(rng)
     model, names, tree = mstmm.compile(mstmm.Scene(**scene)), points_of(scene), read(scene)
@@ -69,7 +69,7 @@ def test_places_velocities_and_jacobians(_: int, rng: np.random.Generator) -> No
     assert worst(model.jacobian(q, names), jacobian(scene, q, model.nu), 1.0) < 1e-12
 
 
-@pytest.mark.parametrize("_", range(COUNT))
+@pytest.mark.parametrize("_", draws(4, 12))
 def test_the_rate_of_jacobians(_: int, rng: np.random.Generator) -> None:
     """Its product with the speeds as the reference has it, each column by its differences."""
     scene, q, u = every(rng)
@@ -89,7 +89,7 @@ def test_the_rate_of_jacobians(_: int, rng: np.random.Generator) -> None:
     assert worst(rate, (ahead - behind) / (2 * h), 1.0) < 1e-7
 
 
-@pytest.mark.parametrize("_", range(COUNT))
+@pytest.mark.parametrize("_", draws(4, 12))
 def test_energy_momentum_and_what_holds_against_gravity(_: int, rng: np.random.Generator) -> None:
     scene, q, u = fresh(rng)
     model, tree = mstmm.compile(mstmm.Scene(**scene)), read(scene)

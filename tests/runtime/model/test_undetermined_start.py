@@ -10,11 +10,8 @@ import pytest
 import mstmm
 from tests.reference import newton_euler as dense
 from tests.reference.compare import worst
+from tests.support.models import compile_scene
 from tests.support.scenes.rods import ROD, chain, drawn_state
-
-
-def compiled(scene: dict[str, Any]) -> mstmm.Model:
-    return mstmm.compile(mstmm.Scene(**scene))
 
 
 def _tip(kind: str, inertia: tuple[float, ...], center: tuple[float, ...] = (0.5, 0, 0)) -> Any:
@@ -51,7 +48,7 @@ UNDETERMINED = {
 @pytest.mark.parametrize("name", UNDETERMINED)
 def test_undetermined_motion_names_the_hinge(name: str) -> None:
     with pytest.raises(mstmm.SceneError, match=r'hinge "hinge1".*undetermined'):
-        compiled(UNDETERMINED[name])
+        compile_scene(UNDETERMINED[name])
 
 
 def test_every_hinge_concerned_is_named_with_a_rotor_as_a_remedy() -> None:
@@ -60,13 +57,13 @@ def test_every_hinge_concerned_is_named_with_a_rotor_as_a_remedy() -> None:
     for k in (1, 2, 3):
         scene["body"][k]["inertia"] = [0, ROD, ROD]
     with pytest.raises(mstmm.SceneError) as caught:
-        compiled(scene)
+        compile_scene(scene)
     text = str(caught.value)
     assert 'hinges "hinge1", "hinge2" and "hinge3" at t = 0 s' in text
     assert "law.inertia" in text
     for k in (1, 2, 3):
         scene["hinge"][k]["law"] = {"inertia": 1e-3}
-    model = compiled(scene)
+    model = compile_scene(scene)
     assert np.isfinite(model.accelerations(*model.initial_state())).all()
 
 
@@ -80,7 +77,7 @@ def test_links_without_inertia_are_all_named() -> None:
         "hinge": [pin | {"name": f"h{k}", "outboard": f"b{k}"} for k in range(3)],
     }
     with pytest.raises(mstmm.SceneError, match='hinges "h0", "h1" and "h2"'):
-        compiled(scene)
+        compile_scene(scene)
 
 
 def test_of_many_hinges_some_are_named() -> None:
@@ -89,7 +86,7 @@ def test_of_many_hinges_some_are_named() -> None:
     rope = {"name": "rope", "count": 200, "inboard": "ground", "body": body,
             "hinge": {"type": "ball"}}  # fmt: skip
     with pytest.raises(mstmm.SceneError, match=r'"rope\[\d+\]\.hinge" and more than 41 others'):
-        compiled({"gravity": (0, 0, 0), "chain": [rope]})
+        compile_scene({"gravity": (0, 0, 0), "chain": [rope]})
 
 
 # --- negative moments -----------------------------------------------------------------------------
@@ -108,8 +105,8 @@ def test_negative_moments_run_where_every_pivot_holds(
 ) -> None:
     scene = _negative("pin", inertia)
     q, u = drawn_state(scene, rng)
-    assert worst(compiled(scene).accelerations(q, u), dense.solve(scene, q, u).udot) < 1e-12
-    run = compiled(scene).simulate(1.0, certify=True)
+    assert worst(compile_scene(scene).accelerations(q, u), dense.solve(scene, q, u).udot) < 1e-12
+    run = compile_scene(scene).simulate(1.0, certify=True)
     assert run.trusted
     assert any("accepted because of allow_unphysical_inertia" in text for text in run.warnings)
 
@@ -125,7 +122,7 @@ def test_negative_moments_run_where_every_pivot_holds(
 )
 def test_a_pivot_that_negative_moments_take_is_refused(scene: dict[str, Any]) -> None:
     with pytest.raises(mstmm.SceneError, match=r'hinge "hinge1".*no positive inertia'):
-        compiled(scene)
+        compile_scene(scene)
 
 
 @pytest.mark.parametrize("method", ["dop853", "rk4"])
@@ -134,7 +131,7 @@ def test_a_pivot_that_goes_on_the_way_ends_the_run(method: str) -> None:
     scene = _negative("prismatic", (ROD, ROD, -0.5), axis=[1, 0, 0], drive="1 - 3*t")
     scene["body"][0] |= {"mass": 0.01, "inertia": [0, 1e-3, 1e-3]}
     step = 0.05 if method == "rk4" else None
-    result = compiled(scene).simulate(1.0, method, step=step)
+    result = compile_scene(scene).simulate(1.0, method, step=step)
     assert not result.success
     assert "hinge0" in result.message
     assert 0.5 < result.t[-1] < 0.65  # (2.5 - 3 t)^2 + 1e-3 + 0.01/4 = 0.5
@@ -143,8 +140,8 @@ def test_a_pivot_that_goes_on_the_way_ends_the_run(method: str) -> None:
 def test_nearly_nothing_counts_as_nothing() -> None:
     """A relative pivot of 1e-16 is rounding, not inertia."""
     with pytest.raises(mstmm.SceneError, match=r'hinge "hinge1".*undetermined'):
-        compiled(_tip("ball", (1e-16, ROD, ROD)))
-    compiled(_tip("ball", (1e-6, ROD, ROD)))
+        compile_scene(_tip("ball", (1e-16, ROD, ROD)))
+    compile_scene(_tip("ball", (1e-6, ROD, ROD)))
 
 
 def test_a_state_on_the_way_is_named_too() -> None:
@@ -154,7 +151,7 @@ def test_a_state_on_the_way_is_named_too() -> None:
     scene["body"][1]["inertia"] = [0, 0, 0]
     scene["hinge"][0]["initial"] = {"q": [0.0], "u": [0.0]}
     scene["hinge"][1]["initial"] = {"q": [1.0], "u": [0.0]}
-    model = compiled(scene)
+    model = compile_scene(scene)
     with pytest.raises(mstmm.NumericalFailure, match=r'hinge "hinge0" at t = 2\.5 s.*undetermined'):
         model.accelerations([0.3, 0.0], [0.0, 0.0], t=2.5)
     assert np.isfinite(model.accelerations([0.3, 0.1], [0.0, 0.0])).all()
@@ -167,7 +164,7 @@ def test_a_run_into_an_undetermined_state_keeps_what_was_computed() -> None:
     scene["body"][1]["inertia"] = [0, 0, 0]
     scene["hinge"][0]["initial"] = {"q": [0.1], "u": [0.1]}
     scene["hinge"][1] |= {"drive": "1 - 2*t", "release": "t >= 0.5"}
-    result = compiled(scene).simulate(1.0)
+    result = compile_scene(scene).simulate(1.0)
     assert not result.success
     assert "hinge" in result.message
     assert "undetermined" in result.message
@@ -196,23 +193,23 @@ def test_a_massless_body_that_carries_a_massive_one_moves(
     size = 2 if carrier == "universal" else 1
     q, u = rng.uniform(-0.8, 0.8, size + 4), rng.uniform(-1, 1, size + 3)
     q[size:] = [1.0, 0.1, -0.2, 0.3]
-    assert worst(compiled(scene).accelerations(q, u), dense.solve(scene, q, u).udot) < 1e-11
+    assert worst(compile_scene(scene).accelerations(q, u), dense.solve(scene, q, u).udot) < 1e-11
 
 
 def test_a_thin_rod_on_a_pin_or_universal_is_no_trouble(rng: np.random.Generator) -> None:
     scene = chain(["pin"] * 4, 0.7, inertia=(0, ROD, ROD))
     q, u = drawn_state(scene, rng)
-    assert worst(compiled(scene).accelerations(q, u), dense.solve(scene, q, u).udot) < 1e-12
+    assert worst(compile_scene(scene).accelerations(q, u), dense.solve(scene, q, u).udot) < 1e-12
 
 
 def test_rotor_inertia_determines_what_the_body_does_not() -> None:
     scene = _tip("pin", (0, 0, 0), (0, 0, 0))
     scene["hinge"][1]["law"] = {"inertia": 0.3, "effort": 0.6}
-    found = compiled(scene).accelerations([0.2, 0.1], [0.0, 0.0])
+    found = compile_scene(scene).accelerations([0.2, 0.1], [0.0, 0.0])
     assert found[1] == pytest.approx(2.0, rel=1e-14)
 
 
 def test_a_driven_hinge_needs_no_inertia() -> None:
     scene = _tip("pin", (0, 0, 0), (0, 0, 0))
     scene["hinge"][1]["drive"] = "0.5*t^2"
-    assert compiled(scene).accelerations([0.2, 0.0], [0.0, 0.0])[1] == pytest.approx(1.0)
+    assert compile_scene(scene).accelerations([0.2, 0.0], [0.0, 0.0])[1] == pytest.approx(1.0)

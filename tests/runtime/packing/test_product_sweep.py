@@ -14,14 +14,11 @@ from tests.reference.compare import fresh, worst
 from tests.reference.jets import Array
 from tests.reference.tree import read
 from tests.support.classical.scene_product import SceneProduct, chain_bodies
+from tests.support.models import compile_scene
 from tests.support.scenes.rods import chain, drawn_state
 
 KINDS = ("pin", "ball", "elastic")
 TIME = 0.3
-
-
-def compiled(scene: dict[str, Any], **options: Any) -> mstmm.Model:
-    return mstmm.compile(mstmm.Scene(**scene), **options)
 
 
 def drawn_chain(
@@ -43,7 +40,7 @@ def drawn_chain(
 @pytest.mark.parametrize("kind", [*KINDS, "free"])
 def test_short_chains_agree_in_doubles(kind: str, count: int, rng: np.random.Generator) -> None:
     scene = chain([kind] * count, skew=0.4, inertia=(0.02, 0.09, 0.08), start=(0.3, -0.5, 0.8))
-    product, riccati = compiled(scene, sweep="product", accuracy=1e-12), compiled(scene)
+    product, riccati = compile_scene(scene, sweep="product", accuracy=1e-12), compile_scene(scene)
     for _ in range(5):
         q, u = drawn_state(scene, rng)
         assert worst(product.accelerations(q, u), riccati.accelerations(q, u)) < 1e-12
@@ -55,11 +52,11 @@ def test_product_with_laws_loads_and_skew_ends(kind: str, rng: np.random.Generat
     """The engine's product has the same loads, laws and frames as its Riccati sweep."""
     for count in (1, 2, 3):
         scene, q, u = drawn_chain(rng, kind, count)
-        product = compiled(scene, sweep="product", accuracy=1e-6)
+        product = compile_scene(scene, sweep="product", accuracy=1e-6)
         udot = product.accelerations(q, u, TIME)
         assert worst(udot, dense.solve(scene, q, u, TIME).udot) < 1e-6
         efforts = rng.uniform(-1, 1, len(u))
-        expected = compiled(scene).accelerations(q, u, TIME, efforts)
+        expected = compile_scene(scene).accelerations(q, u, TIME, efforts)
         assert worst(product.accelerations(q, u, TIME, efforts), expected) < 1e-6
 
 
@@ -69,7 +66,7 @@ def test_product_with_laws_loads_and_skew_ends(kind: str, rng: np.random.Generat
 def deviation(scene: dict[str, Any], q: Array, u: Array) -> float:
     """Accelerations of the input ends: product at 50 digits against the Riccati sweep."""
     expected = SceneProduct(scene, q, u, TIME).accelerations()
-    result = compiled(scene).simulate(TIME, t_start=TIME, initial=(q, u))
+    result = compile_scene(scene).simulate(TIME, t_start=TIME, initial=(q, u))
     found = [
         np.concatenate([result.acceleration(end)[0], result.angular_acceleration(end)[0]])
         for end in chain_bodies(read(scene))
@@ -106,8 +103,8 @@ def test_motions_agree(kind: str) -> None:
     q, u = drawn_state(scene, np.random.default_rng(8))
     times = np.linspace(0, 1, 6)
     options: dict[str, Any] = {"rtol": 1e-10, "output_times": times, "initial": (q, u)}
-    product = compiled(scene, sweep="product").simulate(1.0, **options)
-    riccati = compiled(scene).simulate(1.0, **options)
+    product = compile_scene(scene, sweep="product").simulate(1.0, **options)
+    riccati = compile_scene(scene).simulate(1.0, **options)
     assert product.success, product.message
     assert np.abs(product.q - riccati.q).max() < 1e-9
     assert np.abs(product.u - riccati.u).max() < 1e-8
@@ -116,7 +113,7 @@ def test_motions_agree(kind: str) -> None:
 @pytest.mark.parametrize("sweep", ["riccati", "product"])
 def test_threads_share_a_model(sweep: str, rng: np.random.Generator) -> None:
     scene = chain(["pin"] * 3, skew=0.4, inertia=(0.02, 0.09, 0.08))
-    model = compiled(scene, sweep=sweep, accuracy=1e-6)
+    model = compile_scene(scene, sweep=sweep, accuracy=1e-6)
     states = rng.uniform(-1, 1, (2, 2, 5000, 3))
     expected = [model.accelerations(q, u) for q, u in states]
     with ThreadPoolExecutor(2) as pool:
@@ -131,13 +128,13 @@ def test_accuracy_asked_for_is_kept_or_named() -> None:
     scene = chain(["pin"] * 16)
     q, u = drawn_state(scene, np.random.default_rng(3))
     gap = worst(
-        compiled(scene, sweep="product", accuracy=1.0).accelerations(q, u),
-        compiled(scene).accelerations(q, u),
+        compile_scene(scene, sweep="product", accuracy=1.0).accelerations(q, u),
+        compile_scene(scene).accelerations(q, u),
     )
     assert 1e-12 < gap < 1e-2
-    compiled(scene, sweep="product", accuracy=2 * gap).accelerations(q, u)
+    compile_scene(scene, sweep="product", accuracy=2 * gap).accelerations(q, u)
     with pytest.raises(mstmm.NumericalFailure, match=r"deviation.*accuracy.*riccati"):
-        compiled(scene, sweep="product", accuracy=gap / 2).accelerations(q, u)
+        compile_scene(scene, sweep="product", accuracy=gap / 2).accelerations(q, u)
 
 
 @pytest.mark.parametrize(
@@ -153,7 +150,7 @@ def test_accuracy_asked_for_is_kept_or_named() -> None:
 )
 def test_pairs_without_a_matrix_are_named(kinds: tuple[str, ...], named: str) -> None:
     with pytest.raises(mstmm.SceneError, match=named + ".*riccati"):
-        compiled(chain(kinds), sweep="product")
+        compile_scene(chain(kinds), sweep="product")
 
 
 def _branched(scene: dict[str, Any]) -> None:
@@ -190,16 +187,16 @@ def test_scenes_without_a_matrix_are_named(change: Any, named: str) -> None:
     scene = chain(["pin"] * 3)
     change(scene)
     with pytest.raises(mstmm.SceneError, match=named + ".*riccati"):
-        compiled(scene, sweep="product")
+        compile_scene(scene, sweep="product")
 
 
 def test_an_unknown_sweep_is_named() -> None:
     there_are = 'sweep "plain" is not known; there are: auto, riccati, refined, qr, product'
     with pytest.raises(mstmm.SceneError, match=there_are):
-        compiled(chain(["pin"]), sweep="plain")
+        compile_scene(chain(["pin"]), sweep="plain")
 
 
 @pytest.mark.parametrize("accuracy", [0.0, -1e-6, float("nan")])
 def test_an_accuracy_that_nothing_has_is_refused(accuracy: float) -> None:
     with pytest.raises(mstmm.SceneError, match=r"accuracy = .*positive"):
-        compiled(chain(["pin"]), sweep="product", accuracy=accuracy)
+        compile_scene(chain(["pin"]), sweep="product", accuracy=accuracy)

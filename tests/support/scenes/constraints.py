@@ -11,13 +11,10 @@ import sympy.physics.mechanics as me
 
 import mstmm
 from tests.reference.algebra import orientation, to_quaternion
+from tests.support.models import compile_scene
 
 Scene = dict[str, Any]
 GRAVITY = 9.81
-
-
-def compiled(scene: Scene) -> mstmm.Model:
-    return mstmm.compile(mstmm.Scene(**scene))
 
 
 RADIUS, MASS = 0.3, 2.0
@@ -41,7 +38,7 @@ def on_a_road() -> Scene:
 @cache
 def disc() -> mstmm.Model:
     """The same, compiled."""
-    return compiled(on_a_road())
+    return compile_scene(on_a_road())
 
 
 @cache

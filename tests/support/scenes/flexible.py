@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-import mstmm
+from tests.support.models import compile_scene
 
 Array = npt.NDArray[np.float64]
 Scene = dict[str, Any]
@@ -57,18 +57,13 @@ def turning_beam(spin: float, hub: float = 0.0, **keys: Any) -> Scene:
     )
 
 
-def compiled(data: Scene, engine: str = "looped") -> mstmm.Model:
-    """Model of a scene dictionary."""
-    return mstmm.compile(mstmm.Scene(**data), engine=engine)
-
-
 def motion_near(data: Scene, exact: bool = False) -> tuple[Array, Array]:
     """A_q, A_u: derivatives of the free accelerations by free coordinates and speeds at the start.
 
     Of pins, planar hinges and modes only.  By differences of the looped engine, or exactly, which
     compiles a kernel of its own (minutes for many shapes).
     """
-    model = compiled(data, "fused" if exact else "looped")
+    model = compile_scene(data, "fused" if exact else "looped")
     q, u = model.initial_state()
     driven = [one for one in data["hinge"] if "drive" in one]
     free = np.arange(len(driven), len(u))  # driven hinges come first in these scenes

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-import mstmm
 from tests.reference import newton_euler as dense
 from tests.reference.algebra import attitude, orientation
 from tests.reference.compare import fresh, worst
 from tests.reference.jets import Array
 from tests.reference.random_scenes import floating_tree, random_state
+from tests.support.models import compile_scene
 from tests.support.scenes.scene_changes import (
     heavier,
     permuted,
@@ -28,13 +28,9 @@ ACCURACY = 1e-11
 DRAWS = range(6)
 
 
-def compiled(scene: dict[str, Any]) -> mstmm.Model:
-    return mstmm.compile(mstmm.Scene(**scene))
-
-
 def deviation(scene: dict[str, Any], other: dict[str, Any], q: Array, u: Array) -> float:
-    expected = compiled(scene).accelerations(q, u, TIME)
-    return worst(compiled(other).accelerations(q, u, TIME), expected)
+    expected = compile_scene(scene).accelerations(q, u, TIME)
+    return worst(compile_scene(other).accelerations(q, u, TIME), expected)
 
 
 @pytest.mark.parametrize("draw", DRAWS)
@@ -71,8 +67,8 @@ def test_the_order_of_hinges_is_the_order_of_coordinates(
 ) -> None:
     scene, q, u = fresh(rng)
     other, q_places, u_places = reordered(scene, rng)
-    expected = compiled(scene).accelerations(q, u, TIME)[u_places]
-    found = compiled(other).accelerations(q[q_places], u[u_places], TIME)
+    expected = compile_scene(scene).accelerations(q, u, TIME)[u_places]
+    found = compile_scene(other).accelerations(q[q_places], u[u_places], TIME)
     assert worst(found, expected) < ACCURACY
 
 
@@ -83,8 +79,8 @@ def test_the_unit_of_mass_changes_nothing(
 ) -> None:
     """A power of two not even in the last bit."""
     scene, q, u = fresh(rng)
-    expected = compiled(scene).accelerations(q, u, TIME)
-    found = compiled(heavier(scene, factor)).accelerations(q, u, TIME)
+    expected = compile_scene(scene).accelerations(q, u, TIME)
+    found = compile_scene(heavier(scene, factor)).accelerations(q, u, TIME)
     if factor == 3e4:
         assert worst(found, expected) < ACCURACY
     else:
@@ -96,7 +92,7 @@ def test_a_conservative_motion_runs_backwards() -> None:
     scene = floating_chain(False, {}, [(0.4, 0.7), (-0.6, -1.1)])
     for hinge in scene["hinge"]:
         hinge.get("law", {}).pop("damping", None)
-    model = compiled(scene)
+    model = compile_scene(scene)
     q, u = model.initial_state()
     u[:6] = [0.3, -0.2, 0.1, 0.5, 0.9, -0.4]
     there = model.simulate(1.5, rtol=1e-12, atol=1e-13, initial=(q, u))
@@ -109,7 +105,7 @@ def test_a_motion_in_a_moving_frame_is_the_same_motion() -> None:
     """A constant velocity added to everything that floats without gravity."""
     scene = floating_chain(False, {}, [(0.4, 0.7), (-0.6, -1.1)])
     scene["gravity"] = [0.0, 0.0, 0.0]
-    model, drift = compiled(scene), np.array([3.0, -5.0, 2.0])
+    model, drift = compile_scene(scene), np.array([3.0, -5.0, 2.0])
     q, u = model.initial_state()
     u[3:6] = [0.5, 0.9, -0.4]
     moved = u.copy()
@@ -133,8 +129,8 @@ def test_a_motion_in_a_rotated_scene_is_the_rotated_motion(rng: np.random.Genera
     options: dict[str, Any] = {
         "rtol": 1e-11, "atol": 1e-13, "output_times": times, "initial": (q, u),
     }  # fmt: skip
-    here = compiled(scene).simulate(0.3, **options)
-    there = compiled(rotated(scene, turn, shift)).simulate(0.3, **options)
+    here = compile_scene(scene).simulate(0.3, **options)
+    there = compile_scene(rotated(scene, turn, shift)).simulate(0.3, **options)
     assert here.success, here.message
     assert worst(there.q, here.q) < 1e-9
     assert worst(there.u, here.u) < 1e-8
@@ -193,13 +189,13 @@ def test_a_floating_chain_read_from_either_end() -> None:
     pins, times = [(0.4, 0.7), (-0.6, -1.1)], np.linspace(0, 1, 5)
     start = {"q": [0.1, 0.2, 0.3, 0.8, 0.0, 0.6, 0.0], "u": [0.3, -0.2, 0.1, 0.5, 0.9, -0.4]}
     options: dict[str, Any] = {"rtol": 1e-11, "atol": 1e-13, "output_times": times}
-    here = compiled(floating_chain(False, {"initial": start}, pins)).simulate(1.0, **options)
+    here = compile_scene(floating_chain(False, {"initial": start}, pins)).simulate(1.0, **options)
     # The start of the last body as the forward reading has it; speeds in its own axes.
     place, turned = here.position("body2")[0], here.orientation("body2")[0]
     speeds = [here.velocity("body2")[0], here.angular_velocity("body2")[0]]
     own = np.concatenate([attitude(turned).T @ speed for speed in speeds])
     last = {"q": [*place.tolist(), *turned.tolist()], "u": own.tolist()}
-    there = compiled(floating_chain(True, {"initial": last}, pins)).simulate(1.0, **options)
+    there = compile_scene(floating_chain(True, {"initial": last}, pins)).simulate(1.0, **options)
     assert here.success
     assert there.success
     for i in range(3):
@@ -232,7 +228,7 @@ def test_a_planar_scene_stays_in_its_plane(rng: np.random.Generator) -> None:
             hinge["position"][2] = 0.0
         else:
             hinge["inboard"] = hinge["inboard"].partition(".")[0] + ".plain"
-    result = compiled(scene).simulate(0.5, initial=(q, u))
+    result = compile_scene(scene).simulate(0.5, initial=(q, u))
     assert result.success
     for body in scene["body"]:
         name = body["name"]
@@ -257,7 +253,7 @@ def test_momentum_of_a_floating_tree(draw: int, rng: np.random.Generator) -> Non
         hinge.get("law", {}).pop("friction", None)
         hinge.get("law", {}).pop("inertia", None)
     q, u = random_state(scene, seed)
-    result = compiled(scene).simulate(0.3, rtol=1e-11, atol=1e-13, initial=(q, u))
+    result = compile_scene(scene).simulate(0.3, rtol=1e-11, atol=1e-13, initial=(q, u))
     assert result.success, result.message
     for momentum in (result.momentum(), result.angular_momentum()):
         scale = np.abs(momentum).max() + np.sqrt(result.energy_components()["kinetic"].max())
@@ -273,7 +269,7 @@ def test_energy_rate_is_the_power(draw: int, rng: np.random.Generator) -> None:
     scene, q, u = fresh(rng, most=5)
     for hinge in scene["hinge"]:
         hinge.get("law", {}).pop("limits", None)
-    result = compiled(scene).simulate(
+    result = compile_scene(scene).simulate(
         0.02, rtol=1e-11, atol=1e-13, initial=(q, u), output_times=np.linspace(0, 0.02, 9)
     )
     assert result.success, result.message
@@ -290,13 +286,13 @@ def test_mass_matrix_is_the_hessian_of_the_kinetic_energy(
     draw: int, rng: np.random.Generator
 ) -> None:
     scene, q, u = fresh(rng)
-    model = compiled(scene)
+    model = compile_scene(scene)
     rotors = np.zeros(model.nu)
     for hinge in scene["hinge"]:
         inertia = hinge.get("law", {}).pop("inertia", None)
         if inertia is not None:
             rotors[model.coordinate_layout.hinges[hinge["name"]].u_slice] = inertia
-    with_rotors, bare = model.mass_matrix(q), compiled(scene)
+    with_rotors, bare = model.mass_matrix(q), compile_scene(scene)
     matrix = bare.mass_matrix(q)
     size = np.abs(matrix).max(initial=1.0)
     assert np.array_equal(matrix, matrix.T)
@@ -322,7 +318,7 @@ def test_forward_after_inverse_dynamics(draw: int, rng: np.random.Generator) -> 
             count = {"cylindrical": 2, "universal": 2}.get(hinge["type"], 1)
             hinge["drive"] = ["0.3*sin(2*t)"] + ["free"] * (count - 1)
     dense.fill_driven(scene, q, u, TIME)
-    model = compiled(scene)
+    model = compile_scene(scene)
     driven = model.accelerations(q, u, TIME) - model.accelerations(
         q, u, TIME, rng.uniform(-9, 9, model.nu)
     )
@@ -364,7 +360,7 @@ def test_partly_driven_hinges(kind: str, rng: np.random.Generator) -> None:
         for hinge in found:
             hinge["drive"] = list(drive)
         dense.fill_driven(scene, q, u, TIME)
-        expected, model = dense.solve(scene, q, u, TIME), compiled(scene)
+        expected, model = dense.solve(scene, q, u, TIME), compile_scene(scene)
         assert worst(model.accelerations(q, u, TIME), expected.udot) < ACCURACY
         result = model.simulate(TIME, t_start=TIME, initial=(q, u))
         for hinge in found:
@@ -384,5 +380,5 @@ def test_a_drive_takes_the_state_it_prescribes(rng: np.random.Generator) -> None
     scene["hinge"][0]["drive"] = ["0.3*sin(2*t)"]
     right = copy.deepcopy((q, u))
     dense.fill_driven(scene, *right, TIME)
-    model = compiled(scene)
+    model = compile_scene(scene)
     assert np.array_equal(model.accelerations(q, u, TIME), model.accelerations(*right, TIME))

@@ -15,13 +15,10 @@ from tests.reference.algebra import attitude
 from tests.reference.jets import Array
 from tests.reference.random_scenes import random_state
 from tests.reference.tree import read
+from tests.support.models import compile_scene
 from tests.support.scenes.rods import ROD, chain
 
 SPAN = 0.25
-
-
-def compiled(scene: dict[str, Any]) -> mstmm.Model:
-    return mstmm.compile(mstmm.Scene(**scene))
 
 
 def _oblique(scene: dict[str, Any]) -> dict[str, Any]:
@@ -93,7 +90,7 @@ def test_families(name: str) -> None:
     q, u = random_state(scene, 12)
     times = np.linspace(0.0, SPAN, 4)
     other = dae.simulate(scene, times, q, u, rtol=1e-9, atol=1e-10)
-    found = compiled(scene).simulate(
+    found = compile_scene(scene).simulate(
         SPAN, rtol=1e-11, atol=1e-13, output_times=times, initial=(q, u)
     )
     assert found.success, found.message
@@ -124,7 +121,7 @@ def test_driven_then_released() -> None:
     later = np.linspace(at, 0.3, 3)
     free = dae.simulate(bare, later, held.q[-1], held.u[-1], rtol=1e-10, atol=1e-11)
     times = np.concatenate([held.t[:-1], free.t])
-    found = compiled(released).simulate(
+    found = compile_scene(released).simulate(
         0.3, rtol=1e-11, atol=1e-13, output_times=times, initial=(q, u)
     )
     assert found.success, found.message
@@ -138,7 +135,7 @@ def test_a_fixed_hinge_that_lets_go() -> None:
     q, u = np.array([0.4]), np.array([1.5])
     held = dae.simulate(scene, np.linspace(0, at, 3), q, u, rtol=1e-10, atol=1e-11)
     scene["hinge"][1]["release"] = f"t >= {at}"
-    model = compiled(scene)
+    model = compile_scene(scene)
     model_q, model_u = model.initial_state()
     model_q[0], model_u[0] = 0.4, 1.5
     found = model.simulate(
@@ -188,7 +185,7 @@ JOINTS = {"ball": [0.5, 0.5, 0.02], "elastic": [900.0] * 3 + [0.5, 0.5, 0.02]}
 @pytest.mark.parametrize("kind", JOINTS)
 def test_twist_of_several_turns_is_an_oscillator(kind: str) -> None:
     """Relative twist u0/w sin(w t), w^2 = k / (J/2): more than three turns and back again."""
-    model, speed = compiled(two_bodies(kind, JOINTS[kind])), 8.0
+    model, speed = compile_scene(two_bodies(kind, JOINTS[kind])), 8.0
     rate = np.sqrt(JOINTS[kind][-1] * 2 / 0.3)
     assert speed / rate > 3 * 2 * np.pi
     q, u = model.initial_state()
@@ -208,7 +205,7 @@ def test_twist_with_swing_keeps_energy_and_momentum(kind: str) -> None:
     scene = two_bodies(kind, JOINTS[kind], (0.2, 0.25, 0.3))
     scene["body"][0]["center_of_mass"] = [0.05, -0.02, 0.0]
     scene["body"][1]["center_of_mass"] = [0.02, 0.03, 0.1]
-    model = compiled(scene)
+    model = compile_scene(scene)
     q, u = model.initial_state()
     u[-3:] = [0.4, -0.3, 8.0]
     times = np.linspace(0, 12.0, 241)
@@ -232,7 +229,7 @@ def test_swing_of_a_ball_past_the_horizontal_keeps_its_energy() -> None:
     scene = chain(["ball", "ball"], inertia=(0.05, ROD, ROD))
     for hinge in scene["hinge"]:
         hinge |= {"axis": [1, 0, 0], "law": {"stiffness": [2.0, 2.0, 2.0]}}
-    model = compiled(scene)
+    model = compile_scene(scene)
     q, u = model.initial_state()
     q[4:8] = [np.cos(0.95), 0, np.sin(0.95), 0]
     u[:] = [0.5, 0.3, -0.4, 2.0, 3.0, -2.0]

@@ -35,7 +35,7 @@ def test_lagrange_agrees_with_the_dense_equations(n: int, rng: np.random.Generat
     assert worst(dense.solve(scene, q, u).udot, expected) < 1e-12
 
 
-@pytest.mark.parametrize("n", [3, 30, 300, 1000])
+@pytest.mark.parametrize("n", [3, 30, 300, pytest.param(1000, marks=pytest.mark.soak)])
 def test_any_length(n: int, rng: np.random.Generator) -> None:
     assert error(np.ones(n), rng) < 2e-13
 

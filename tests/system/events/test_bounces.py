@@ -10,6 +10,7 @@ import pytest
 import mstmm
 from mstmm.runtime.integrate.c_loop import Status
 from tests.runtime.engine.loops.test_acceleration_refinement import LENGTHS, chain
+from tests.support.models import compile_scene
 from tests.support.scenes.published_mechanisms import rod
 from tests.system.loops.test_four_bar import linkage
 
@@ -28,16 +29,14 @@ def ball(**event: Any) -> Scene:
     }  # fmt: skip
 
 
-def model(scene: Scene) -> mstmm.Model:
-    return mstmm.compile(mstmm.Scene(**scene))
-
-
 @pytest.mark.parametrize("when", ["ball.y <= 0", "fall.q < 0"])
 @pytest.mark.parametrize("method", ["dop853", "scipy-DOP853"])
 def test_a_ball_loses_its_height_by_squares(when: str, method: str) -> None:
     """Heights e^(2k), times of flight 2 sqrt(2 h / g) each; then it rests, before the end of the
     run, which says so and is no success."""
-    result = model(ball(when=when)).simulate(20.0, method, rtol=1e-10, atol=1e-12, certify=True)
+    result = compile_scene(ball(when=when)).simulate(
+        20.0, method, rtol=1e-10, atol=1e-12, certify=True
+    )
     assert result.status is Status.CAME_TO_REST and not result.success and not result.trusted
     assert "come to rest" in result.message
     assert "come to rest" in str(result.certificate.verdict())
@@ -62,7 +61,7 @@ def test_blows_alone_do_work(engine: str, method: str) -> None:
 
 def test_a_wall_that_comes_to_meet() -> None:
     """A floor that rises by 0.5 m/s throws the ball up by e times the speed that they meet with."""
-    result = model(ball(when="ball.y <= 0.5*t", restitution=1.0)).simulate(0.6, rtol=1e-10)
+    result = compile_scene(ball(when="ball.y <= 0.5*t", restitution=1.0)).simulate(0.6, rtol=1e-10)
     hit = int(np.flatnonzero(result.trajectory.event > 0)[0])
     before = result.u[hit - 1, 0] - 0.5
     assert before < 0 and abs(result.u[hit, 0] - 0.5 + before) < 1e-12
@@ -83,7 +82,7 @@ def pendulum() -> Scene:
 
 def test_a_double_pendulum_strikes_a_wall() -> None:
     """u' = u - (1 + e) (A u) / (A M^-1 A^T) M^-1 A^T with M and A of both angles by hand."""
-    one = model(pendulum())
+    one = compile_scene(pendulum())
     result = one.simulate(3.0, rtol=1e-10, atol=1e-12)
     hit = int(np.flatnonzero(result.trajectory.event > 0)[0])
     a, b = result.q[hit, 0], result.q[hit].sum()
@@ -108,7 +107,7 @@ def kinetic(q: np.ndarray, u: np.ndarray, masses: np.ndarray) -> float:
 
 def struck(scene: Scene, when: str, restitution: float, until: float) -> mstmm.Result:
     scene["event"] = [{"when": when, "do": "bounce", "restitution": restitution}]
-    return model(scene).simulate(until, rtol=1e-10, atol=1e-12)
+    return compile_scene(scene).simulate(until, rtol=1e-10, atol=1e-12)
 
 
 @pytest.mark.parametrize("cut", ["rocker_pin", "closing_pin"])
@@ -116,7 +115,7 @@ def struck(scene: Scene, when: str, restitution: float, until: float) -> mstmm.R
 def test_a_stop_in_a_four_bar(pin: str, cut: str) -> None:
     """Of one freedom all speeds turn round alike, whether the pin that is stopped is cut or not."""
     scene = linkage(cut, laws=False)
-    start = model(scene)
+    start = compile_scene(scene)
     place = start.coordinate_layout.hinges[pin].q
     begin, end = (float(x) for x in start.simulate(0.05).q[[0, -1], place])
     result = struck(scene, f"{pin}.q {'>' if end > begin else '<'} {end!r}", 0.4, 0.1)
@@ -130,7 +129,7 @@ def test_carnot_in_a_loop() -> None:
     the energy falls by (1-e)/(1+e) times that of the change."""
     masses = np.array([1.0, 0.5, 2.0, 1.0, 1.5, 1.0])
     scene = chain(masses.tolist())
-    free = model(scene).simulate(0.2, output_times=[0.0, 0.2])
+    free = compile_scene(scene).simulate(0.2, output_times=[0.0, 0.2])
     path = free.position("rod2.tip")[:, 1]
     wall = float(path.mean())
     result = struck(scene, f"rod2.tip.y {'>' if path[1] > path[0] else '<'} {wall!r}", 0.3, 0.2)
@@ -158,13 +157,13 @@ def test_carnot_in_a_loop() -> None:
 )
 def test_refused(event: Scene, said: str) -> None:
     with pytest.raises(mstmm.SceneError, match=said):
-        model(ball(**event))
+        compile_scene(ball(**event))
 
 
 def test_nothing_gives_way() -> None:
     scene = ball()
     scene["hinge"][0] |= {"initial": {}, "drive": "1 - t"}
-    result = model(scene).simulate(2.0)
+    result = compile_scene(scene).simulate(2.0)
     assert not result.success
     assert 'event "floor"' in result.message and "no motion can respond" in result.message
 
@@ -197,8 +196,8 @@ def bladed(when: str) -> mstmm.Model:
     blade = {"name": "blade", "length": 1.0, "mass_per_length": 1.2, "bending_stiffness": 20.0,
              "modes": 2}  # fmt: skip
     event = {"name": "floor", "when": when, "do": "bounce", "restitution": 0.6}
-    return model({"gravity": [0, -G, 0], "body": [hub, knob], "hinge": hinges, "beam": [blade],
-                  "event": [event]})  # fmt: skip
+    scene = {"gravity": [0, -G, 0], "body": [hub, knob], "hinge": hinges, "beam": [blade]}
+    return compile_scene(scene | {"event": [event]})
 
 
 @pytest.mark.parametrize(("end", "height"), [("blade.tip", -0.5), ("knob.tip", -0.6)])
@@ -228,7 +227,7 @@ def test_a_shape_alone_is_no_place() -> None:
 def begun(when: str, height: float, speed: float, **more: Any) -> mstmm.Model:
     scene = ball(when=when)
     scene["hinge"][0]["initial"] = {"q": height, "u": speed}
-    return model(scene | more)
+    return compile_scene(scene | more)
 
 
 @pytest.mark.parametrize("method", ["dop853", "rodas4p2", "scipy-DOP853"])
@@ -278,7 +277,7 @@ def test_what_an_acceleration_takes_away_may_begin_at_rest_on_a_wall() -> None:
     assert begun("ball.y >= 1", 1.0, 0.0).simulate(0.4).q[-1, 0] == pytest.approx(1 - G * 0.08)
     hinge = {"name": "pin", "type": "pin", "inboard": "ground", "outboard": "rod"}
     wall = {"name": "wall", "when": "rod.tip.x >= 1", "do": "bounce", "restitution": 0.5}
-    one = model({"gravity": [0, -G, 0], "body": [rod("rod", 1.0, 1.0)], "hinge": [hinge],
+    one = compile_scene({"gravity": [0, -G, 0], "body": [rod("rod", 1.0, 1.0)], "hinge": [hinge],
                  "event": [wall]})  # fmt: skip
     assert one.simulate(0.5).success
 
@@ -293,7 +292,7 @@ def test_two_balls_that_touch() -> None:
              "restitution": 1.0}  # fmt: skip
     scene = {"gravity": [0, -G, 0], "body": bodies, "hinge": hinges, "event": [event]}
     with pytest.raises(mstmm.SceneError, match='event "hit"'):
-        model(scene).simulate(0.1)
+        compile_scene(scene).simulate(0.1)
 
 
 @pytest.mark.parametrize("restitution", [0.5, 0.3, 0.1, 0.01])
@@ -303,7 +302,7 @@ def test_two_balls_that_touch() -> None:
 def test_a_ball_comes_to_rest_on_its_floor(method: str, restitution: float) -> None:
     """Flights by flights shorter, none of which a step may span: t = sqrt(2 h / g) (1 + e)/(1 - e)
     if there were no end of them."""
-    one = model(ball(when="ball.y <= 0", restitution=restitution))
+    one = compile_scene(ball(when="ball.y <= 0", restitution=restitution))
     height = one.initial_state()[0][0]
     run = one.simulate(10.0, method)
     assert "bounces accumulate" in run.message
@@ -316,7 +315,7 @@ def test_a_stop_that_was_asked_for_is_a_success() -> None:
     scene = ball(when="ball.y <= 0")
     low = {"name": "low", "when": "ball.y < 0.5", "do": "stop"}
     scene["event"] = [*scene["event"], low]
-    run = model(scene).simulate(20.0)
+    run = compile_scene(scene).simulate(20.0)
     assert run.status is Status.STOPPED and run.success
     assert run.t[-1] == pytest.approx(np.sqrt(1.0 / G), rel=1e-9)
 
@@ -335,9 +334,9 @@ def test_what_a_controller_does_at_the_start_tells_a_start_on_a_stop(push: float
     }  # fmt: skip
     if push > 0:
         with pytest.raises(mstmm.SceneError, match="at rest on the stop"):
-            model(scene).simulate(1.0)
+            compile_scene(scene).simulate(1.0)
     else:
-        assert model(scene).simulate(1.0).q[-1, 0] == pytest.approx(-0.5)
+        assert compile_scene(scene).simulate(1.0).q[-1, 0] == pytest.approx(-0.5)
 
 
 @pytest.mark.parametrize("far", [0.0, 7e6])
@@ -354,7 +353,7 @@ def test_a_start_is_on_a_stop_by_its_own_coordinate(far: float) -> None:
         bodies = [{"name": "hub", "mass": 100.0, "inertia": [10.0] * 3},
                   {"name": "panel", "mass": 5.0, "center_of_mass": [0.5, 0, 0],
                    "inertia": [0.1, 1.5, 1.5]}]  # fmt: skip
-        return model({"gravity": [0, 0, 0], "body": bodies, "hinge": [free, pin]})
+        return compile_scene({"gravity": [0, 0, 0], "body": bodies, "hinge": [free, pin]})
 
     assert begun_at(-5e-3, 0.0).simulate(0.1).success
     assert begun_at(0.0, -5e-6).simulate(0.1).success
@@ -369,5 +368,5 @@ def test_a_wheel_that_touches_at_its_lowest_point_goes_on(rate: float) -> None:
            "initial": {"q": -np.pi / 2, "u": rate}}  # fmt: skip
     event = {"name": "floor", "when": "wheel.rim.y <= -1", "do": "bounce", "restitution": 0.5}
     scene = {"gravity": [0, 0, 0], "body": [wheel], "hinge": [pin], "event": [event]}
-    run = model(scene).simulate(0.1 / rate)
+    run = compile_scene(scene).simulate(0.1 / rate)
     assert run.q[-1, 0] == pytest.approx(-np.pi / 2 + 0.1)

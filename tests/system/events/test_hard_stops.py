@@ -8,15 +8,12 @@ import numpy as np
 import pytest
 
 import mstmm
+from tests.support.models import compile_scene
 from tests.support.scenes.linkages import four_bar
 from tests.support.scenes.published_mechanisms import rod
 
 Scene = dict[str, Any]
 G = 9.81
-
-
-def model(scene: Scene) -> mstmm.Model:
-    return mstmm.compile(mstmm.Scene(**scene))
 
 
 def slider(limits: Any, kind: str = "prismatic", **start: Any) -> Scene:
@@ -30,7 +27,7 @@ def slider(limits: Any, kind: str = "prismatic", **start: Any) -> Scene:
 @pytest.mark.parametrize("method", ["dop853", "rk4", "scipy-DOP853", "rodas4p2"])
 def test_between_two_stops(method: str) -> None:
     """2 m/s from the middle of 2 m: 0.5 s to the first stop, then 2, 4 s from one to the other."""
-    one = model(slider({"lower": -1.0, "upper": 1.0, "restitution": 0.5}, q=0.0, u=2.0))
+    one = compile_scene(slider({"lower": -1.0, "upper": 1.0, "restitution": 0.5}, q=0.0, u=2.0))
     result = one.simulate(7.0, method, step=0.01 if method == "rk4" else None)
     assert result.success, result.message
     assert np.abs(result.t[result.trajectory.event > 0] - [0.5, 2.5, 6.5]).max() < 1e-9
@@ -41,7 +38,7 @@ def test_between_two_stops(method: str) -> None:
 def test_one_coordinate_of_several() -> None:
     """y of three is stopped: x and the angle go on."""
     stop = {"upper": 0.3, "restitution": 0.6}
-    one = model(slider([{}, stop, {}], "planar", q=[0, 0, 0], u=[0.2, 1.0, 0.7]))
+    one = compile_scene(slider([{}, stop, {}], "planar", q=[0, 0, 0], u=[0.2, 1.0, 0.7]))
     result = one.simulate(1.0)
     assert np.abs(result.u[-1] - [0.2, -0.6, 0.7]).max() < 1e-12
     assert [stop.name for stop in one.scene.events] == ["rail.upper[1]"]
@@ -56,7 +53,7 @@ def test_the_knee_of_a_chain() -> None:
             "law": {"limits": {"lower": -0.4, "upper": 0.5, "restitution": 0.3}}}  # fmt: skip
     chain = {"name": "arm", "count": 2, "inboard": "ground", "body": [table, table],
              "hinge": [top, knee]}  # fmt: skip
-    result = model({"gravity": [0, -G, 0], "chain": [chain]}).simulate(2.0, rtol=1e-10)
+    result = compile_scene({"gravity": [0, -G, 0], "chain": [chain]}).simulate(2.0, rtol=1e-10)
     hit = int(np.flatnonzero(result.trajectory.event > 0)[0])
     assert abs(abs(result.q[hit, 1] - 0.05) - 0.45) < 1e-12
     both = 0.5 * np.cos(result.q[hit, 1])
@@ -72,7 +69,7 @@ def test_the_knee_of_a_chain() -> None:
 def test_a_rocker_between_stops(cut: str) -> None:
     """One freedom: all speeds turn round alike, the loop stays closed and the balance is kept."""
     stops = {"lower": 1.35, "upper": 1.6, "restitution": 0.7}
-    one = model(four_bar(speed=2.0, cut=cut, laws={"end": {"limits": stops}}))
+    one = compile_scene(four_bar(speed=2.0, cut=cut, laws={"end": {"limits": stops}}))
     result = one.simulate(1.0, rtol=1e-9, certify=True)
     assert result.success, result.message
     for hit in np.flatnonzero(result.trajectory.event > 0):
@@ -90,7 +87,7 @@ def test_what_lies_on_a_stop_needs_one_that_carries() -> None:
     """Thrown back ever lower until t = 2 v / g / (1 - e) after the first blow."""
     scene = slider({"lower": 0.0, "restitution": 0.5}, q=1.0)
     scene |= {"gravity": [0, 0, -G]}
-    result = model(scene).simulate(5.0, rtol=1e-10)
+    result = compile_scene(scene).simulate(5.0, rtol=1e-10)
     assert 'stop "rail.lower"' in result.message and "with a stiffness" in result.message
     assert abs(result.t[-1] - np.sqrt(2 / G) * (1 + 2 * 0.5 / 0.5)) < 1e-5
 
@@ -99,7 +96,7 @@ def test_nothing_gives_way() -> None:
     scene = slider({"upper": 0.5, "restitution": 0.5})
     scene["hinge"][0] |= {"drive": "t"}
     del scene["hinge"][0]["initial"]
-    result = model(scene).simulate(1.0)
+    result = compile_scene(scene).simulate(1.0)
     assert 'stop "rail.upper"' in result.message and "no motion can respond" in result.message
 
 
@@ -117,17 +114,17 @@ def test_nothing_gives_way() -> None:
 )
 def test_refused(limits: Scene, start: Scene, said: str) -> None:
     with pytest.raises(mstmm.SceneError, match=said) as caught:
-        model(slider(limits, **start)).simulate(0.1)
+        compile_scene(slider(limits, **start)).simulate(0.1)
     assert "rail" in str(caught.value)
 
 
 def test_a_start_that_leaves_a_stop_is_taken() -> None:
-    one = model(slider({"upper": 1.0, "restitution": 0.5}, q=1.0, u=-1.0))
+    one = compile_scene(slider({"upper": 1.0, "restitution": 0.5}, q=1.0, u=-1.0))
     assert one.simulate(0.5).q[-1, 0] == pytest.approx(0.5)
 
 
 def test_a_start_that_moves_against_a_stop_is_thrown_back() -> None:
-    one = model(slider({"upper": 1.0, "restitution": 0.5}, q=1.0, u=1.0))
+    one = compile_scene(slider({"upper": 1.0, "restitution": 0.5}, q=1.0, u=1.0))
     assert one.simulate(0.5).q[-1, 0] == pytest.approx(0.75)
 
 
@@ -155,8 +152,8 @@ def test_a_knee_stops_as_an_event_does() -> None:
                 "body": [rod("upper", 1.0, 1.0), rod("lower", 0.7, 0.5)]}  # fmt: skip
 
     law = {"limits": {"upper": 0.3, "restitution": 0.4}}
-    stopped = model(arm(law=law)).simulate(2.0)
+    stopped = compile_scene(arm(law=law)).simulate(2.0)
     event = {"when": "knee.q[0] > 0.3", "do": "bounce", "restitution": 0.4}
-    told = model(arm() | {"event": [event]}).simulate(2.0)
+    told = compile_scene(arm() | {"event": [event]}).simulate(2.0)
     assert (stopped.trajectory.event > 0).any()
     assert np.array_equal(stopped.q, told.q) and np.array_equal(stopped.u, told.u)

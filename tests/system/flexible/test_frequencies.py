@@ -10,10 +10,10 @@ import pytest
 from tests.reference.compare import worst
 from tests.reference.flexible import closed_forms
 from tests.reference.flexible import finite_elements as fe
+from tests.support.models import looped_model
 from tests.support.scenes.flexible import (
     Array,
     beam,
-    compiled,
     frequencies,
     hinge,
     motion_near,
@@ -211,7 +211,7 @@ def test_steady_stretch_of_a_turning_beam() -> None:
         beam("blade", length, 1.4e4, **own),
         hinge("drive", "pin", "ground", "blade", drive=f"{spin!r}*t"),
     )
-    model = compiled(data)
+    model = looped_model(data)
     q, u = model.initial_state()
     by_q, _ = motion_near(data)
     for _ in range(3):  # Newton's steps to a steady deflection

@@ -10,7 +10,8 @@ import pytest
 from tests.reference import hinges
 from tests.reference.compare import worst
 from tests.reference.flexible import dense, random_beams
-from tests.support.scenes.flexible import Array, Scene, beam, compiled, hinge, scene
+from tests.support.models import compile_scene, looped_model
+from tests.support.scenes.flexible import Array, Scene, beam, hinge, scene
 
 DOWN = (0.0, -9.81, 0.0)
 
@@ -58,7 +59,7 @@ def test_spatial_power_balance(slope: float) -> None:
         q, u = random_beams.random_state(data, 4, size=0.0)
         q[-6:] = slope * np.array([1.0, -1.1, 0.8, -0.9, 1.2, 1.0])
         u = rng.uniform(-1, 1, len(u))
-        udot = compiled(data).accelerations(q, u)
+        udot = looped_model(data).accelerations(q, u)
         whole, kinetic = power(data, q, u, udot)
         worst_share = max(worst_share, abs(whole / kinetic))
     assert worst_share < 1e-8
@@ -77,7 +78,7 @@ def test_energy_of_a_flexible_pendulum_in_space(frame: str) -> None:
         hinge("knot", "ball", "rod.tip", "bob"),
         gravity=DOWN,
     )  # fmt: skip
-    result = compiled(data).simulate(2.0, rtol=1e-10, atol=1e-13)
+    result = looped_model(data).simulate(2.0, rtol=1e-10, atol=1e-13)
     assert result.success, result.message
     energy = np.asarray(result.energy())
     slope = np.abs(result.slope("rod", "tip")).max()
@@ -95,7 +96,7 @@ def test_stiff_beams_tend_to_rigid_ones_as_one_over_their_stiffness() -> None:
     )  # fmt: skip
     times = np.linspace(0.0, 1.0, 51)
     settings: dict[str, Any] = {"output_times": times, "rtol": 1e-11, "atol": 1e-13}
-    exact = compiled(rigid).simulate(1.0, **settings).position("rod.tip")
+    exact = looped_model(rigid).simulate(1.0, **settings).position("rod.tip")
     apart = []
     for stiffness in (1e2, 1e3, 1e4):
         data = scene(
@@ -103,7 +104,7 @@ def test_stiff_beams_tend_to_rigid_ones_as_one_over_their_stiffness() -> None:
             hinge("pin", "pin", "ground", "rod"),
             gravity=DOWN,
         )
-        found = compiled(data).simulate(1.0, **settings)
+        found = looped_model(data).simulate(1.0, **settings)
         apart.append(np.abs(found.position("rod.tip") - exact).max())
     assert apart[0] < 2e-3
     assert abs(apart[0] / apart[1] - 10) < 2
@@ -126,11 +127,13 @@ def two_link_arm(modes: dict[str, int], turned: bool) -> Scene:
 def test_a_plane_motion_is_the_same_in_space_and_in_any_plane() -> None:
     times = np.linspace(0.0, 1.0, 11)
     settings: dict[str, Any] = {"output_times": times, "rtol": 1e-11, "atol": 1e-13}
-    flat = compiled(two_link_arm({"y": 2}, False)).simulate(1.0, **settings).position("lower.tip")
-    spatial = compiled(two_link_arm({"y": 2, "z": 2}, False)).simulate(1.0, **settings)
+    flat = (
+        looped_model(two_link_arm({"y": 2}, False)).simulate(1.0, **settings).position("lower.tip")
+    )
+    spatial = looped_model(two_link_arm({"y": 2, "z": 2}, False)).simulate(1.0, **settings)
     assert np.abs(spatial.position("lower.tip") - flat).max() < 1e-9
     assert np.abs(spatial.position("lower.tip")[:, 2]).max() == 0.0
-    turned = compiled(two_link_arm({"z": 2}, True)).simulate(1.0, **settings)
+    turned = looped_model(two_link_arm({"z": 2}, True)).simulate(1.0, **settings)
     x, y, z = turned.position("lower.tip").T
     assert np.abs(np.array([x, z, y]).T - flat).max() < 1e-9
 
@@ -145,7 +148,7 @@ def apart_in_frames(kind: str, stiffness: float, count: int) -> float:
         body = beam("rod", 1.0, stiffness, frame=frame, **own)
         data = scene(body, hinge("root", kind, "ground", "rod"), gravity=DOWN)
         times = np.linspace(0.0, 0.5, 26)
-        result = compiled(data).simulate(0.5, output_times=times, rtol=1e-10, atol=1e-12)
+        result = looped_model(data).simulate(0.5, output_times=times, rtol=1e-10, atol=1e-12)
         assert result.success, result.message
         tips.append(result.position("rod.tip"))
     return max(float(np.abs(tip - tips[0]).max()) for tip in tips)
@@ -163,12 +166,14 @@ def test_frames_give_one_converged_motion(kind: str, bound: float) -> None:
 def test_fused_is_looped() -> None:
     data = two_link_arm({"y": 2, "z": 1}, False)
     q, u = some_state(data)
-    looped, fused = (compiled(data, engine).accelerations(q, u) for engine in ("looped", "fused"))
+    looped, fused = (
+        compile_scene(data, engine).accelerations(q, u) for engine in ("looped", "fused")
+    )
     assert worst(fused, looped) < 1e-13
 
 
 def some_state(data: Scene) -> tuple[Array, Array]:
-    model, rng = compiled(data), np.random.default_rng(3)
+    model, rng = looped_model(data), np.random.default_rng(3)
     q, u = model.initial_state()
     return q + rng.uniform(-0.05, 0.05, len(q)), rng.uniform(-1, 1, len(u))
 
@@ -182,7 +187,7 @@ def test_quadrature_differs_in_third_order_alone() -> None:
     for quadrature in (False, True):
         body = beam("rod", 1.0, 20.0, **own) | {"quadrature": quadrature}
         data = scene(body, hinge("pin", "pin", "ground", "rod"), gravity=DOWN)
-        forms.append((data, compiled(data)))
+        forms.append((data, looped_model(data)))
     apart = []
     for size in (0.02, 0.01, 0.005):
         q, u = np.array([0.4, size, -0.7 * size]), np.array([1.5, 8 * size, 3 * size])
@@ -203,7 +208,7 @@ def test_static_start_under_weight_and_under_the_same_load_per_length() -> None:
         scene(body, clamp, gravity=DOWN),
         scene(body, clamp, load=[{"on": "shelf", "force_per_length": [0.0, -weight, 0.0]}]),
     ):
-        result = compiled(data).simulate(0.2, rtol=1e-10)
+        result = looped_model(data).simulate(0.2, rtol=1e-10)
         sag = result.position("shelf.tip")[:, 1]
         assert abs(sag[0] * 8 * stiffness / weight + 1) < 2e-4
         assert np.ptp(sag) < 1e-9
@@ -215,7 +220,7 @@ def test_drag_slows_a_sliding_beam() -> None:
         beam("plank", 1.0, 50.0, modes={"y": 2}, frame="mean", basis="free-free", viscous_drag=0.7),
         hinge("slide", "prismatic", "ground", "plank", axis=[0, 1, 0], initial={"u": [2.0]}),
     )
-    result = compiled(data).simulate(1.5, rtol=1e-10)
+    result = looped_model(data).simulate(1.5, rtol=1e-10)
     assert abs(result.velocity("plank")[-1, 1] - 2 * np.exp(-1.05)) < 1e-8
 
 
@@ -241,7 +246,7 @@ def test_work_of_everything_that_is_not_stored() -> None:
             {"on": "arm", "force_per_length": [0.0, 0.4, 0.2], "span": [0.3, 0.9]},
         ],
     )  # fmt: skip
-    result = compiled(data).simulate(1.0, rtol=1e-10, atol=1e-13)
+    result = looped_model(data).simulate(1.0, rtol=1e-10, atol=1e-13)
     assert result.success, result.message
     balance = np.asarray(result.energy()) - result.work
     assert np.ptp(result.work) > 0.1

@@ -15,17 +15,9 @@ import pytest
 from tests.reference.compare import worst
 from tests.reference.flexible.inextensible import Beam, spectral
 from tests.reference.flexible.inextensible import spin_up as turning
+from tests.support.models import compile_scene, looped_model
 from tests.support.paths import TESTS
-from tests.support.scenes.flexible import (
-    Array,
-    Scene,
-    beam,
-    compiled,
-    hinge,
-    javelin,
-    scene,
-    spin_up,
-)
+from tests.support.scenes.flexible import Array, Scene, beam, hinge, javelin, scene, spin_up
 
 CONVERGED = json.loads((TESTS / "reference" / "flexible" / "converged.json").read_text())
 DOWN = (0.0, -9.81, 0.0)
@@ -36,7 +28,7 @@ def tip_error(data: Scene, case: str) -> float:
     """Largest distance of the last beam's tip from the reference over the motion, m."""
     reference = CONVERGED[case]
     times = np.array(reference["t"])
-    result = compiled(data).simulate(times[-1], output_times=times, rtol=1e-8, atol=1e-10)
+    result = looped_model(data).simulate(times[-1], output_times=times, rtol=1e-8, atol=1e-10)
     assert result.success, result.message
     tip = result.position(data["beam"][-1]["name"] + ".tip")[:, :2]
     return float(np.linalg.norm(tip - reference["tip"], axis=1).max())
@@ -154,7 +146,7 @@ def spinning(case: str, n: int, **keys: Any) -> Scene:
 def deflection(data: Scene, end: float = 8.0, engine: str = "looped") -> tuple[Array, Array]:
     """Times and deflection of the tip across the root's tangent."""
     times = np.linspace(0.0, end, int(end / 0.01) + 1)
-    result = compiled(data, engine).simulate(end, output_times=times, rtol=1e-8, atol=1e-10)
+    result = compile_scene(data, engine).simulate(end, output_times=times, rtol=1e-8, atol=1e-10)
     assert result.success, result.message
     tip, angle = result.position("blade.tip"), result.q[:, 0]
     return times, np.cos(angle) * tip[:, 1] - np.sin(angle) * tip[:, 0]
@@ -215,7 +207,7 @@ THROWN = {
 
 def thrown(data: Scene) -> tuple[Any, list[float]]:
     """The result and V_RB, w_RB, mass centre at release."""
-    result = compiled(data).simulate(
+    result = looped_model(data).simulate(
         2.0, output_times=np.linspace(0.0, 2.0, 21), rtol=1e-9, atol=1e-11
     )
     assert result.success, result.message

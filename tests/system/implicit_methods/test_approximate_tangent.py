@@ -16,13 +16,10 @@ from mstmm.runtime.integrate.steppers import EXPLICIT, IMPLICIT, ITERATED_METHOD
 from mstmm.runtime.run.integration_run import make_run
 from mstmm.runtime.run.scene_system import SceneSystem
 from tests.support.implicit_methods import motions
+from tests.support.models import compile_scene, looped_model
 from tests.support.scenes.results import rod
 
 Scene = dict[str, Any]
-
-
-def compiled(scene: Scene, engine: str = "looped") -> mstmm.Model:
-    return mstmm.compile(mstmm.Scene(**scene), engine=engine)
 
 
 def everything() -> Scene:
@@ -55,7 +52,7 @@ ORDERS: dict[str, Scene] = {
 @pytest.mark.parametrize("name", ORDERS)
 @pytest.mark.parametrize("method", W_METHODS)
 def test_methods_that_allow_it_keep_their_order(method: str, name: str) -> None:
-    model = compiled(ORDERS[name])
+    model = looped_model(ORDERS[name])
     exact = model.simulate(0.5, rtol=1e-13, atol=1e-14, output_times=[0.5]).q
     errors = []
     for count in (32, 128):
@@ -81,7 +78,7 @@ def counted(
 
 @pytest.mark.parametrize("method", ITERATED_METHODS)
 def test_iterations_agree_whatever_tangent_they_take(method: str) -> None:
-    model = compiled(everything())
+    model = looped_model(everything())
     how: dict[str, Any] = {"rtol": 1e-7, "atol": 1e-9}
     if not get(method).adaptive:
         how = {"step": 2e-3, "rtol": 1e-9, "atol": 1e-11}  # which bounds what iterations leave
@@ -97,7 +94,7 @@ def test_iterations_agree_whatever_tangent_they_take(method: str) -> None:
 def test_where_laws_do_not_contract_exact_tangents_follow() -> None:
     """A row of rods of which one is spun: what pulls at the others is no law (h w is about 1)."""
     scene = scenes.bushed_rods(6, 1e8, 1.0)
-    model = compiled(scene)
+    model = looped_model(scene)
     u = np.zeros(model.nu)
     u[2] = 40.0  # rad/s of the first rod, which takes the others along
     q, _ = model.initial_state()
@@ -126,7 +123,7 @@ def test_an_iteration_by_laws_is_a_residual_and_a_solution() -> None:
     hinge = {"name": "rail", "type": "prismatic", "axis": [1, 0, 0], "inboard": "ground",
              "outboard": "mass", "law": law, "initial": {"q": [0.1]}}  # fmt: skip
     body = {"name": "mass", "mass": 1.0}
-    model = compiled({"gravity": [0, 0, 0], "body": [body], "hinge": [hinge]})
+    model = looped_model({"gravity": [0, 0, 0], "body": [body], "hinge": [hinge]})
     steps = 100
     for tangent in ("exact", "laws"):
         run = model.simulate(
@@ -152,7 +149,7 @@ def test_an_iteration_by_laws_is_a_residual_and_a_solution() -> None:
 def test_a_run_continues_bit_for_bit_from_every_step(
     method: str, how: dict[str, Any], spin: float
 ) -> None:
-    model = compiled(scenes.bushed_rods(4, 1e6, 0.01))
+    model = looped_model(scenes.bushed_rods(4, 1e6, 0.01))
     settings = validate(Settings(0.3, method=method, atol=1e-6, **how))
     q, u = model.initial_state()
     u = np.array(u)
@@ -180,7 +177,7 @@ def test_a_run_continues_bit_for_bit_from_every_step(
 
 def test_code_of_the_scene_keeps_the_exact_tangent_unless_asked() -> None:
     """There the exact one is a few lines; by laws alone both engines make the same run."""
-    looped, fused = (compiled(everything(), engine) for engine in ("looped", "fused"))
+    looped, fused = (compile_scene(everything(), engine) for engine in ("looped", "fused"))
     how: dict[str, Any] = {"rtol": 1e-6, "atol": 1e-8}
     assert counted(fused, "esdirk436", **how)[1].approximate_tangents == 0
     for method in ("rodas4pw", "esdirk436"):
@@ -203,7 +200,7 @@ def test_methods_that_need_the_exact_one_say_so() -> None:
 
 
 def test_a_result_keeps_which_tangent_was_taken(tmp_path: Any) -> None:
-    model = compiled(everything())
+    model = looped_model(everything())
     result = model.simulate(
         0.1, mstmm.methods.Implicit("rodas4pw", tangent="laws"), rtol=1e-4, atol=1e-7
     )
@@ -214,7 +211,7 @@ def test_a_result_keeps_which_tangent_was_taken(tmp_path: Any) -> None:
 
 
 def test_a_batch_takes_it_too() -> None:
-    model = compiled(everything())
+    model = looped_model(everything())
     q, u = model.initial_state()
     by_laws, by_all = (
         mstmm.methods.Implicit("rodas4pw", tangent=tangent) for tangent in ("laws", "exact")

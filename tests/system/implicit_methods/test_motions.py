@@ -6,21 +6,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-import mstmm
 from mstmm.runtime.result.result import Result
 from tests.support.implicit_methods import motions
 from tests.support.implicit_methods.motions import KNOWN
+from tests.support.models import looped_model
 
 #: How far a number that is kept may be off, m.
 ROUNDED = 3e-10
 
 
-def model_of(scene: motions.Scene) -> mstmm.Model:
-    return mstmm.compile(mstmm.Scene(**scene), engine="looped")
-
-
 def explicit(scene: motions.Scene, t_end: float, tolerance: float = 1e-12) -> Result:
-    found = model_of(scene).simulate(
+    found = looped_model(scene).simulate(
         t_end, method="dop853", rtol=tolerance, atol=tolerance, output_times=[t_end]
     )
     assert found.success, found.message
@@ -43,7 +39,7 @@ def test_double_pendulum_is_where_lagrange_in_absolute_angles_says() -> None:
 
 @pytest.mark.parametrize("k", [1e4, 1e6, 1e8])
 def test_bushings_of_the_double_pendulum_are_as_stiff_as_meant(k: float) -> None:
-    model = model_of(motions.double_pendulum(k))
+    model = looped_model(motions.double_pendulum(k))
     slopes = np.asarray(model.derivatives(*model.initial_state()).q)
     fastest = np.sqrt(np.abs(np.linalg.eigvals(slopes)).max())
     # What stretches the two springs across the rods: heights and angles of two free rods.
@@ -64,7 +60,7 @@ def test_moving_base_is_where_its_linear_equation_says() -> None:
 
 @pytest.mark.parametrize("count", [1, 5, 20])
 def test_upright_chain_falls_at_its_rate(count: int) -> None:
-    model = model_of(motions.upright_chain(count, 0.0))
+    model = looped_model(motions.upright_chain(count, 0.0))
     slopes = np.asarray(model.derivatives(*model.initial_state()).q)
     rates = np.sqrt(np.sort(np.real(np.linalg.eigvals(slopes))))
     assert rates == pytest.approx(motions.chain_frequencies(count), rel=1e-8)
@@ -72,7 +68,7 @@ def test_upright_chain_falls_at_its_rate(count: int) -> None:
 
 @pytest.mark.parametrize("weight", [0.0, 1e3, 1e5])
 def test_hanging_chain_swings_at_its_frequencies(weight: float) -> None:
-    model = model_of(motions.hanging_chain(5, weight, angle=0.0))
+    model = looped_model(motions.hanging_chain(5, weight, angle=0.0))
     slopes = np.asarray(model.derivatives(*model.initial_state()).q)
     found = np.sqrt(np.sort(-np.real(np.linalg.eigvals(slopes))))
     assert found == pytest.approx(motions.chain_frequencies(5, weight), rel=1e-8)
@@ -91,7 +87,7 @@ def test_beam_pendulum_has_the_frequency_that_limits_explicit_steps(
     bending_stiffness: float,
 ) -> None:
     # Rows of the pin and of three sines of the chord: M of a uniform bar with int x sin, int sin^2.
-    model = model_of(motions.beam_pendulum(bending_stiffness))
+    model = looped_model(motions.beam_pendulum(bending_stiffness))
     slopes = np.asarray(model.derivatives(*model.initial_state()).q)
     found = np.sqrt(np.abs(np.linalg.eigvals(slopes)).max())
     k = np.arange(1, 4)

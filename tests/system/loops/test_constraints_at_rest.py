@@ -11,16 +11,8 @@ import pytest
 import mstmm
 from tests.reference.compare import worst
 from tests.reference.jets import Array
-from tests.support.scenes.constraints import (
-    GRAVITY,
-    MASS,
-    RADIUS,
-    Scene,
-    bead,
-    compiled,
-    disc,
-    governor,
-)
+from tests.support.models import compile_scene
+from tests.support.scenes.constraints import GRAVITY, MASS, RADIUS, Scene, bead, disc, governor
 
 WIDTH = 0.7
 
@@ -28,7 +20,7 @@ WIDTH = 0.7
 def hung(law: dict[str, Any], scene: Scene) -> mstmm.Model:
     """The scene with a law on its only hinge."""
     scene["hinge"][0]["law"] = law
-    return compiled(scene)
+    return compile_scene(scene)
 
 
 def on_a_parabola() -> mstmm.Model:
@@ -69,14 +61,14 @@ def test_a_bead_that_nothing_holds_on_a_helix() -> None:
     scene = bead(("0.5*cos(s)", "0.2*s"), 0.0, (0.5, 0.0))
     scene["constraint"][0]["curve"][1] = "0.5*sin(s)"
     with pytest.raises(mstmm.NumericalFailure, match=r"equilibrium.* along at.vy"):
-        compiled(scene).equilibrium()
+        compile_scene(scene).equilibrium()
 
 
 def test_a_bob_on_a_distance() -> None:
     """A spherical pendulum: sqrt(g / l) both ways, while the bob turns freely."""
     free = {"name": "at", "type": "free", "inboard": "ground", "outboard": "bob",
             "initial": {"q": [0, 0, -0.8, 1, 0, 0, 0]}}  # fmt: skip
-    model = compiled({
+    model = compile_scene({
         "gravity": [0, 0, -GRAVITY], "hinge": [free],
         "body": [{"name": "bob", "mass": 0.5, "inertia": [0.1, 0.1, 0.1]}],
         "constraint": [{"name": "wire", "type": "distance", "from": "ground", "to": "bob",
@@ -122,7 +114,7 @@ def test_a_disc_that_leans() -> None:
     """No rest is near: its weight pulls it over with m g r sin(lean), 0.2 rad off, or 0.8 N m."""
     free = {"name": "at", "type": "free", "inboard": "ground", "outboard": "disc",
             "initial": {"q": [0, 0, 0.2, 1, 0.1, 0, 0]}}  # fmt: skip
-    leaning = compiled({
+    leaning = compile_scene({
         "gravity": [0, 0, -GRAVITY], "hinge": [free],
         "body": [{"name": "disc", "mass": 2.0, "inertia": [0.02, 0.04, 0.02]}],
         "constraint": [{"name": "road", "type": "rolling", "from": "ground", "to": "disc",
@@ -138,7 +130,7 @@ def test_slopes_of_accelerations() -> None:
     scene["hinge"][0]["drive"] = "0"
     scene["hinge"][1]["law"] = {"stiffness": 300.0, "rest": -0.1, "damping": 2.0}
     scene["hinge"][2]["law"] = {"stiffness": 5.0, "damping": 0.7}
-    model = compiled(scene)
+    model = compile_scene(scene)
     linear, size = model.linearize(), 1e-4
     assert linear.constrained_motion is not None
     ways, places, q = (

@@ -12,7 +12,8 @@ import scipy.integrate
 
 import mstmm
 from tests.reference.algebra import attitude
-from tests.support.scenes.constraints import GRAVITY, compiled, cycloid, disc, governor, kane
+from tests.support.models import compile_scene
+from tests.support.scenes.constraints import GRAVITY, cycloid, disc, governor, kane
 
 METHODS = ("rodas4p2", "rodas5p", "kvaerno5", "genalpha")
 
@@ -46,7 +47,7 @@ def test_a_rolling_disc_against_kane(method: str, leaning: float) -> None:
 @pytest.mark.parametrize(("method", "order"), [("rodas5p", 5), ("esdirk436", 4), ("genalpha", 2)])
 def test_orders_of_a_governor(method: str, order: int) -> None:
     """Distances among driven hinges."""
-    model = compiled(governor("constraint"))
+    model = compile_scene(governor("constraint"))
     wanted = model.simulate(0.4, rtol=1e-12, atol=1e-13, output_times=[0.0, 0.4]).q[-1]
     errors = [
         float(np.abs(model.simulate(0.4, method, step=0.4 / n).q[-1] - wanted).max())
@@ -60,7 +61,7 @@ def test_a_bead_on_a_cycloid(method: str) -> None:
     """Swings in a time that is always the same (Huygens)."""
     a, start = 0.5, 2.2
     times = np.linspace(0.0, 2.0, 5)
-    result = compiled(cycloid(start, a)).simulate(2.0, method, rtol=1e-8, output_times=times)
+    result = compile_scene(cycloid(start, a)).simulate(2.0, method, rtol=1e-8, output_times=times)
     assert result.success, result.message
     wanted = 4 * a * math.sin(start / 2) * np.cos(math.sqrt(GRAVITY / (4 * a)) * times)
     assert np.abs(4 * a * np.sin(result.q[:, 7] / 2) - wanted).max() < 1e-6
@@ -76,12 +77,12 @@ def test_a_stiff_spring_at_a_rod_takes_implicit_steps() -> None:
     result = model.simulate(0.3, "auto", rtol=1e-5, output_times=[0.0, 0.3])
     assert result.success, result.message
     assert [one.method for one in result.method_history][:2] == ["dop853", "rodas4p2"]
-    rigid = compiled(governor("constraint")).simulate(0.3, rtol=1e-9, output_times=[0.0, 0.3])
+    rigid = compile_scene(governor("constraint")).simulate(0.3, rtol=1e-9, output_times=[0.0, 0.3])
     assert np.abs(result.q[-1] - rigid.q[-1]).max() < 1e-3
 
 
 def test_own_coordinates_go_by_the_name_of_their_constraint(tmp_path: Path) -> None:
-    model = compiled(cycloid(0.4))
+    model = compile_scene(cycloid(0.4))
     names = model.coordinate_layout.q_names
     assert len(names) == model.nq and names[-1] == "wire.s" == model.coordinate_layout.q_name(
         model.nq - 1

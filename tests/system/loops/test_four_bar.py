@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import mstmm
+from tests.support.models import compile_scene
 from tests.support.scenes.published_mechanisms import Scene, rod
 
 LENGTHS = {"crank": 0.5, "coupler": 1.1, "rocker": 0.8}
@@ -60,10 +61,6 @@ def linkage(cut: str | None, laws: bool = True, **more: Scene) -> Scene:
             "hinge": hinges}  # fmt: skip
 
 
-def model(scene: Scene) -> mstmm.Model:
-    return mstmm.compile(mstmm.Scene(**scene))
-
-
 #: Every body keeps one of the pins that hold it: only these can be cut.
 CUTS = ("rocker_pin", "closing_pin")
 
@@ -71,7 +68,7 @@ CUTS = ("rocker_pin", "closing_pin")
 def test_cutting_another_hinge_changes_nothing() -> None:
     found = []
     for cut in CUTS:
-        one = model(linkage(cut))
+        one = compile_scene(linkage(cut))
         assert one.loops.cut_hinges == (cut,)
         q, u = one.initial_state()
         result = one.simulate(3.0, rtol=1e-10, atol=1e-12, output_times=[0.0, 1.5, 3.0])
@@ -112,7 +109,7 @@ def lagrange(q: np.ndarray[Any, Any], u: np.ndarray[Any, Any]) -> np.ndarray[Any
 
 @pytest.mark.parametrize("cut", CUTS)
 def test_accelerations_are_those_of_lagrange(cut: str) -> None:
-    one = model(linkage(cut, laws=False))
+    one = compile_scene(linkage(cut, laws=False))
     q, u = one.initial_state()
     assert np.abs(one.accelerations(q, u) - lagrange(q, u)).max() < 1e-12
 
@@ -121,7 +118,7 @@ def test_energy_is_kept_and_the_loop_stays_closed() -> None:
     """10 000 steps of fixed length; angles follow the crank turn by turn."""
     scene = linkage("closing_pin", laws=False)
     scene["hinge"][0]["initial"]["u"] = 8.0
-    one = model(scene)
+    one = compile_scene(scene)
     result = one.simulate(20.0, "rk4", step=2e-3, output_times=np.linspace(0.0, 20.0, 41))
     assert result.success, result.message
     energy = result.energy()
@@ -145,7 +142,7 @@ def test_driven_pins_in_the_tree_and_cut(pin: str) -> None:
             hinge["initial"] = {"q": dict(zip(PINS, angles(0.7), strict=True))[hinge["name"]]}
             if "drive" in hinge:
                 del hinge["initial"]
-        one = model(scene)
+        one = compile_scene(scene)
         assert one.loops.mobility == 0
         result = one.simulate(0.5, rtol=1e-10, atol=1e-12, output_times=[0.0, 0.25, 0.5])
         assert result.success, result.message
@@ -173,7 +170,7 @@ def test_a_hinge_that_lets_go(kind: str, cut: str) -> None:
     else:
         held.pop("initial")
         held["drive"] = f"{start['closing_pin']!r}"
-    one = model(scene)
+    one = compile_scene(scene)
     assert one.loops.mobility == 0
     result = one.simulate(0.7, rtol=1e-10, atol=1e-12, output_times=[0.0, 0.2, 0.7])
     assert result.success, result.message
@@ -183,7 +180,7 @@ def test_a_hinge_that_lets_go(kind: str, cut: str) -> None:
     if kind == "pin":
         free = linkage(cut, laws=False)
         free["hinge"][0]["initial"].pop("u")
-        wanted = model(free).simulate(0.5, rtol=1e-10, atol=1e-12, output_times=[0.0, 0.5])
+        wanted = compile_scene(free).simulate(0.5, rtol=1e-10, atol=1e-12, output_times=[0.0, 0.5])
         assert np.abs(result.q[-1] - wanted.q[-1]).max() < 1e-7
     else:
         assert np.ptp(result.energy()) < 1e-8
@@ -192,19 +189,19 @@ def test_a_hinge_that_lets_go(kind: str, cut: str) -> None:
 def test_a_free_hinge_closes_nothing() -> None:
     scene = linkage(None, laws=False)
     scene["hinge"][3] |= {"type": "free", "cut": True, "initial": {}}
-    one = model(scene)
+    one = compile_scene(scene)
     assert (one.loops.rank, one.loops.constraint_rows, one.loops.mobility) == (0, (), 3)
     result = one.simulate(0.6, output_times=[0.0, 0.6])
     tree = linkage(None, laws=False)
     del tree["hinge"][3]
-    wanted = model(tree).simulate(0.6, output_times=[0.0, 0.6])
+    wanted = compile_scene(tree).simulate(0.6, output_times=[0.0, 0.6])
     assert np.abs(result.q[-1, :3] - wanted.q[-1]).max() < 1e-7
 
 
 def test_an_event_reads_a_cut_hinge() -> None:
     scene = linkage("closing_pin", laws=False)
     scene["event"] = [{"when": "closing_pin.q > 1.0", "do": "stop"}]
-    result = model(scene).simulate(3.0)
+    result = compile_scene(scene).simulate(3.0)
     assert "stopped by event" in result.message
     assert abs(result.q[-1, 3] - 1.0) < 1e-8
 
@@ -215,7 +212,7 @@ def rocker_driven() -> mstmm.Model:
     scene = linkage("closing_pin", False, rocker_pin={"drive": f"{start!r} + t"})
     scene["hinge"][2].pop("initial")
     scene["hinge"][0]["initial"].pop("u")
-    return model(scene)
+    return compile_scene(scene)
 
 
 def test_a_start_that_cannot_be_closed_is_refused() -> None:

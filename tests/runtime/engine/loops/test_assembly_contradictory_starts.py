@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import mstmm
+from tests.support.models import compile_scene
 from tests.support.scenes.linkages import angles, cranks, four_bar
 from tests.support.scenes.published_mechanisms import four_bars
 
@@ -19,10 +20,6 @@ Scene = dict[str, Any]
 def hinge(scene: Scene, name: str) -> Scene:
     found: Scene = next(one for one in scene["hinge"] if one["name"] == name)
     return found
-
-
-def compiled(scene: Scene) -> mstmm.Model:
-    return mstmm.compile(mstmm.Scene(**scene))
 
 
 def driven(**drives: str) -> Scene:
@@ -93,13 +90,13 @@ REFUSED = {
 def test_what_is_refused_is_told(what: str) -> None:
     scene, words = REFUSED[what]
     with pytest.raises(mstmm.SceneError, match=words) as caught:
-        compiled(scene)
+        compile_scene(scene)
     assert "; " in str(caught.value)
 
 
 def test_drives_that_part_on_the_way_are_told() -> None:
     """At rest at the start they agree."""
-    result = compiled(driven(foot="0.9", end=f"{REST!r} + t^2")).simulate(0.5, "dop853")
+    result = compile_scene(driven(foot="0.9", end=f"{REST!r} + t^2")).simulate(0.5, "dop853")
     assert not result.success
     assert re.search(f"no nearby state closes it; {SHARED}", result.message)
 
@@ -115,7 +112,7 @@ def test_three_drives_on_two_freedoms() -> None:
             joint[key] = re.sub("^(crank|coupler|rocker)", r"\g<1>2", joint[key])
     scene = {**one, "body": one["body"] + other["body"], "hinge": one["hinge"] + other["hinge"]}
     with pytest.raises(mstmm.SceneError, match=SHARED):
-        compiled(scene)
+        compile_scene(scene)
 
 
 def test_one_drive_too_many_of_a_chain_of_windows() -> None:
@@ -127,18 +124,18 @@ def test_one_drive_too_many_of_a_chain_of_windows() -> None:
         foot["drive"] = f"1.1 + {pace}*t"
     told = '"foot0", "foot1", "foot2" move the same degree of freedom .*; omit all but one of these'
     with pytest.raises(mstmm.SceneError, match=told):
-        compiled(scene)
+        compile_scene(scene)
 
 
 def test_what_agrees_is_taken() -> None:
     """As many drives and holds as one likes, where they say the same."""
-    assert compiled(driven(foot="0.9", end=f"{REST!r}")).simulate(0.1).success
-    assert compiled(held("foot", "knee", "tip", "end")).loops.mobility == 1
+    assert compile_scene(driven(foot="0.9", end=f"{REST!r}")).simulate(0.1).success
+    assert compile_scene(held("foot", "knee", "tip", "end")).loops.mobility == 1
 
 
 @pytest.mark.parametrize("misfit", [0.0, 1e-7, 1e-5, 1e-4, 3e-4])
 def test_a_misfit_leaves_open_what_exact_axes_do(misfit: float) -> None:
-    model = compiled(four_bar(end={"axis": [math.sin(misfit), 0, math.cos(misfit)]}))
+    model = compile_scene(four_bar(end={"axis": [math.sin(misfit), 0, math.cos(misfit)]}))
     assert model.loops.indeterminate_reactions == dict.fromkeys(("foot", "knee", "tip", "end"),
                                                    ("fz", "mx", "my"))  # fmt: skip
 
@@ -150,7 +147,7 @@ def test_one_speed_beside_a_singular_pose(angle: float) -> None:
     for one in scene["hinge"]:
         one.get("initial", {}).pop("u", None)
     scene["hinge"][0].setdefault("initial", {})["u"] = 1.0
-    model = compiled(scene)
+    model = compile_scene(scene)
     assert model.loops.singular
     result = model.simulate(0.3, rtol=1e-8)
     assert result.success, result.message
@@ -162,7 +159,7 @@ def test_a_trajectory_that_does_not_close_fails_alone() -> None:
     scene = driven(foot="a + t")
     scene["input"] = [{"name": "a", "value": 0.9, "rates": [0, 0], "unit": "rad"}]
     next(body for body in scene["body"] if body["name"] == "coupler")["ends"]["tip"][0] = 0.95
-    model = compiled(scene)
+    model = compile_scene(scene)
     states = tuple(np.tile(one, (3, 1)) for one in model.initial_state())
     batch = model.simulate_batch(
         (states[0], states[1]), {"a.value": np.array([0.9, 1.0, 3.14])}, t_end=0.1
@@ -178,15 +175,15 @@ def test_a_crank_too_long_by_more_than_a_misfit_is_a_structure() -> None:
         body = next(one for one in scene["body"] if one["name"] == name)
         body["ends"] = {end: [x * (1 + much), y, z] for end, (x, y, z) in body["ends"].items()}
         if moves:
-            assert compiled(scene).loops.mobility == 1
+            assert compile_scene(scene).loops.mobility == 1
         else:
             with pytest.raises(mstmm.SceneError, match="no degrees of freedom"):
-                compiled(scene)
+                compile_scene(scene)
 
 
 def test_an_open_state_is_told_as_such() -> None:
     """Where a mechanism is asked for what its loops leave free, they must be closed."""
-    model = compiled(four_bar(speed=1.0))
+    model = compile_scene(four_bar(speed=1.0))
     q, u = model.initial_state()
     with pytest.raises(mstmm.NumericalFailure, match=r'hinge "tip" has a position gap .*assemble'):
         model.mass_matrix(q + 0.1)

@@ -15,7 +15,8 @@ from tests.reference.compare import worst
 from tests.reference.jets import Array
 from tests.runtime.linear.test_drive_inputs_closed_loops import turned
 from tests.runtime.model.test_equilibrium_closed_loops import five_bar
-from tests.runtime.packing.loops.test_cut_tree import LAWS, compiled
+from tests.runtime.packing.loops.test_cut_tree import LAWS
+from tests.support.models import compile_scene
 from tests.support.scenes.linkages import OBLIQUE, bricard, four_bar, rod
 from tests.system.loops.test_flexible_against_tree import shackled, slider_crank
 
@@ -68,14 +69,14 @@ def led() -> dict[str, Any]:
 SMOOTH = {name: {k: x for k, x in law.items() if k != "friction"} for name, law in LAWS.items()}
 
 MOVING: dict[str, tuple[Callable[[], mstmm.Model], float | list[float]]] = {
-    "four-bar": (lambda: compiled(four_bar(laws=SMOOTH, tilt=OBLIQUE)), 1.7),
-    "bricard": (lambda: compiled(ring()), -0.8),
-    "on balls": (lambda: compiled(between_balls()), [1.1, -0.7]),
+    "four-bar": (lambda: compile_scene(four_bar(laws=SMOOTH, tilt=OBLIQUE)), 1.7),
+    "bricard": (lambda: compile_scene(ring()), -0.8),
+    "on balls": (lambda: compile_scene(between_balls()), [1.1, -0.7]),
     "driven": (lambda: turned(1.0, 0.9, 0), 0.6),
-    "led": (lambda: compiled(led()), -1.2),
+    "led": (lambda: compile_scene(led()), -1.2),
     "a bent rod": (lambda: mstmm.compile(mstmm.Scene(**slider_crank())), [0.8] + [0.0] * 20),
     "bent and shackled": (lambda: mstmm.compile(mstmm.Scene(**shackled())), 0.3),
-    "at rest": (lambda: compiled(four_bar(laws=SMOOTH, tilt=OBLIQUE)), 0.0),
+    "at rest": (lambda: compile_scene(four_bar(laws=SMOOTH, tilt=OBLIQUE)), 0.0),
 }
 
 
@@ -176,7 +177,7 @@ def test_a_governor_turns_freely() -> None:
     """Its arm swings about the angle that it keeps, and takes from the spin what it gives back."""
     angle = 0.7
     spin, free, _ = steady(angle)
-    model = compiled(governor(angle))
+    model = compile_scene(governor(angle))
     q = model.initial_state()[0]
     u = np.zeros(model.nu)
     u[0] = spin
@@ -196,7 +197,7 @@ def test_a_governor_turns_freely() -> None:
 def test_a_governor_is_turned() -> None:
     """A drive holds the spin: the arm finds its angle, and swings otherwise."""
     spin, _, held = steady(0.7)
-    model = compiled(governor(0.6, drive=f"{spin!r}*t"))
+    model = compile_scene(governor(0.6, drive=f"{spin!r}*t"))
     linear = model.linearize()
     assert linear.state.q[1] == pytest.approx(0.7, abs=1e-9)
     assert linear.modes().omega ** 2 == pytest.approx([held], rel=1e-9)
@@ -207,7 +208,7 @@ def test_parts_of_a_motion() -> None:
     """Springs and dampers apart from what the motion makes."""
     scene = governor(0.7)
     scene["hinge"][1]["law"] = {"stiffness": 5.0, "rest": 0.7, "damping": 0.3}
-    sprung, bare = compiled(scene), compiled(governor(0.7))
+    sprung, bare = compile_scene(scene), compile_scene(governor(0.7))
     q, u = sprung.initial_state()[0], np.zeros(sprung.nu)
     u[0] = steady(0.7)[0]
     here, there = sprung.linearize(q, u), bare.linearize(q, u)

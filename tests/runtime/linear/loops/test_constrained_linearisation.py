@@ -11,8 +11,8 @@ import pytest
 import mstmm
 from tests.reference.compare import worst
 from tests.reference.jets import Array
-from tests.runtime.packing.loops.test_cut_tree import compiled
 from tests.support import planar_four_bar as planar
+from tests.support.models import compile_scene
 from tests.support.scenes.linkages import OBLIQUE, bricard, cranks, four_bar, legs
 from tests.support.scenes.published_mechanisms import four_bars
 
@@ -43,7 +43,7 @@ def on_a_spring() -> dict[str, Any]:
 def test_a_crank_on_a_spring() -> None:
     """Angle and frequency as they come from one coordinate; without what the loads of the loop
     make of turning rows the frequency is off by 1.5 parts in a hundred."""
-    model = compiled(on_a_spring())
+    model = compile_scene(on_a_spring())
     rest = model.equilibrium()
     assert abs(rest[0] + 0.0276626292722723) < 1e-13
     assert list(rest.residuals) == ["foot.angle_rate"]
@@ -62,8 +62,8 @@ def test_a_crank_on_a_spring() -> None:
 
 @pytest.mark.parametrize("cut", planar.NAMES)
 def test_cutting_another_hinge_changes_nothing(cut: str) -> None:
-    model = compiled(four_bar(cut=cut, laws=LAWS, tilt=OBLIQUE))
-    plain = compiled(four_bar(laws=LAWS))
+    model = compile_scene(four_bar(cut=cut, laws=LAWS, tilt=OBLIQUE))
+    plain = compile_scene(four_bar(laws=LAWS))
     assert abs(model.equilibrium()[0] - plain.equilibrium()[0]) < 1e-12
     here, there = model.linearize(), plain.linearize()
     for name in ("M", "C", "K", "C_damping", "K_elastic", "K_geometric"):
@@ -81,7 +81,7 @@ def test_cutting_another_hinge_changes_nothing(cut: str) -> None:
 @pytest.fixture(scope="module")
 def platform() -> mstmm.Model:
     """Six legs on springs and dampers: 15 rows, 6 motions."""
-    return compiled(legs(law=1e4))
+    return compile_scene(legs(law=1e4))
 
 
 def test_matrices_are_slopes_of_accelerations(platform: mstmm.Model) -> None:
@@ -132,7 +132,7 @@ def test_responses_are_those_of_the_matrices(platform: mstmm.Model) -> None:
 
 def test_windows_that_hang() -> None:
     """Five windows of four-bars swing as one pendulum of six rods that carry five."""
-    model = compiled(four_bars(5, 0.7, 0.0))
+    model = compile_scene(four_bars(5, 0.7, 0.0))
     rest = model.equilibrium()
     feet = [rest[model.coordinate_layout.hinges[f"foot{k}"].q] for k in range(6)]
     assert worst(np.remainder(feet, 2 * np.pi), np.full(6, 1.5 * np.pi)) < 1e-10
@@ -144,7 +144,7 @@ def test_upright_cranks_buckle() -> None:
     redundant: its loads are not determined, the frequency is."""
     scene = cranks(angle=np.pi / 2)
     scene["hinge"][0]["law"] = {"stiffness": 30.0, "rest": np.pi / 2}
-    model = compiled(scene)
+    model = compile_scene(scene)
     weight, inertia = 9.81 * 0.6 * (3 / 2 + 1), 0.6**2 * (3 / 3 + 1)
     assert model.modes().omega == pytest.approx([np.sqrt((30 - weight) / inertia)], rel=1e-10)
     found = model.stability_limit("foot0.law.stiffness", 30.0, 5.0)
@@ -153,7 +153,7 @@ def test_upright_cranks_buckle() -> None:
 
 def test_cranks_that_hang() -> None:
     """Where a row of the third crank takes the place of another."""
-    rest = compiled(cranks(angle=1.5 * np.pi)).modes()
+    rest = compile_scene(cranks(angle=1.5 * np.pi)).modes()
     weight, inertia = 9.81 * 0.6 * (3 / 2 + 1), 0.6**2 * (3 / 3 + 1)
     assert rest.omega == pytest.approx([np.sqrt(weight / inertia)], rel=1e-9)
 
@@ -161,7 +161,7 @@ def test_cranks_that_hang() -> None:
 def test_bricards_ring_comes_to_rest() -> None:
     """Where its height changes no more with any turn, followed through poses where other rows take
     over."""
-    model = compiled(bricard())
+    model = compile_scene(bricard())
     rest = model.equilibrium()
     assert np.abs(model.accelerations(rest, np.zeros(model.nu))).max() < 1e-8
     linear = model.linearize()
@@ -178,7 +178,7 @@ REFUSED: dict[str, tuple[Callable[[mstmm.Model], Any], str]] = {
 def test_refused(what: str) -> None:
     asked, message = REFUSED[what]
     with pytest.raises(mstmm.SceneError, match=message):
-        asked(compiled(four_bar()))
+        asked(compile_scene(four_bar()))
 
 
 def test_motions_of_drives() -> None:
@@ -187,7 +187,7 @@ def test_motions_of_drives() -> None:
     scene["body"].append({"name": "flag", "mass": 0.1, "inertia": [1e-3, 1e-3, 1e-3]})
     scene["hinge"].append({"name": "mast", "type": "pin", "inboard": "crank.tip",
                            "outboard": "flag", "drive": "0.3"})  # fmt: skip
-    model = compiled(scene)
+    model = compile_scene(scene)
     assert model.linearize().coordinate_names == ("foot.angle",)
     shaken = model.linearize(inputs=["mast.angle_acceleration"])
     assert abs(shaken.V[0, 0] + 1e-3) < 1e-15
@@ -196,7 +196,7 @@ def test_motions_of_drives() -> None:
 
 def test_nothing_holds_it() -> None:
     scene = four_bar() | {"gravity": [0.0, 0.0, 0.0]}
-    model = compiled(scene)
+    model = compile_scene(scene)
     with pytest.raises(mstmm.NumericalFailure, match=r"undetermined along foot\.angle_rate"):
         model.equilibrium()
     assert model.modes().omega == pytest.approx([0.0], abs=1e-7)

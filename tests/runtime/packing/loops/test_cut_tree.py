@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-import mstmm
 from tests.reference.compare import worst
 from tests.reference.expressions import drive
 from tests.reference.jets import Array
 from tests.support import planar_four_bar as planar
+from tests.support.models import compile_scene
 from tests.support.scenes.linkages import OBLIQUE, bricard, four_bar, legs
 
 #: Something in every hinge of the four-bar.
@@ -26,10 +26,6 @@ LAWS: dict[str, dict[str, Any]] = {
 SPEED = 2.0
 
 
-def compiled(scene: dict[str, Any]) -> mstmm.Model:
-    return mstmm.compile(mstmm.Scene(**scene))
-
-
 def signs(cut: str) -> Array:
     """Of the coordinates of foot, knee, tip and end: hinges behind the cut one are turned round."""
     knee = -1.0 if cut == "foot" else 1.0
@@ -41,7 +37,7 @@ def signs(cut: str) -> Array:
 @pytest.mark.parametrize("cut", planar.NAMES)
 def test_any_hinge_of_a_four_bar(cut: str, tilt: tuple[float, float, float]) -> None:
     """Springs, dampers, a motor, friction, rotors in all hinges; in the plane and across."""
-    model = compiled(four_bar(speed=SPEED, cut=cut, laws=LAWS, tilt=tilt))
+    model = compile_scene(four_bar(speed=SPEED, cut=cut, laws=LAWS, tilt=tilt))
     assert model.loops.cut_hinges == (cut,)
     found, rates = planar.start(0.9, SPEED)
     q, u = model.initial_state()
@@ -55,7 +51,7 @@ def test_any_hinge_of_a_four_bar(cut: str, tilt: tuple[float, float, float]) -> 
 def test_any_hinge_of_a_four_bar_over_time(cut: str) -> None:
     """3 s, against the planar equations by SciPy."""
     times = np.linspace(0.0, 3.0, 7)
-    model = compiled(four_bar(speed=SPEED, cut=cut, laws=LAWS, tilt=OBLIQUE))
+    model = compile_scene(four_bar(speed=SPEED, cut=cut, laws=LAWS, tilt=OBLIQUE))
     result = model.simulate(3.0, "dop853", rtol=1e-11, atol=1e-12, output_times=times)
     assert result.success, result.message
     found, rates = planar.motion(0.9, SPEED, LAWS, times)
@@ -71,7 +67,7 @@ def test_a_driven_crank(cut: str) -> None:
     scene = four_bar(cut=cut, laws=laws)
     foot = next(hinge for hinge in scene["hinge"] if hinge["name"] == "foot")
     del foot["initial"]
-    model = compiled(scene | {
+    model = compile_scene(scene | {
         "hinge": [hinge | ({"drive": text} if hinge is foot else {}) for hinge in scene["hinge"]]
     })  # fmt: skip
     angle, speed, turn = drive(text, 0.0)
@@ -100,7 +96,7 @@ def test_any_hinge_of_a_bricard_ring() -> None:
     assert np.abs(speed).max() < 1e-15
     pins = np.arange(6)
     for cut in range(6):
-        model = compiled(bricard(cut))
+        model = compile_scene(bricard(cut))
         assert model.loops.cut_hinges == (f"pin{cut}",)
         udot = model.accelerations(*model.initial_state())
         turned_round = (pins > cut) | (pins == 5)
@@ -118,7 +114,7 @@ def test_any_leg_carries_the_platform() -> None:
         for hinge in scene["hinge"]:
             if hinge["type"] == "ball":
                 hinge["cut"] = hinge["name"] != f"head{first}"
-        model = compiled(scene)
+        model = compile_scene(scene)
         assert set(model.loops.cut_hinges) == {f"head{k}" for k in range(6) if k != first}
         assert (model.loops.rank, model.loops.mobility) == (15, 6)
         udot = model.accelerations(*model.initial_state())

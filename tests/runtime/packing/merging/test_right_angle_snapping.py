@@ -16,7 +16,7 @@ import mstmm
 from mstmm.cli.app import app
 from mstmm.numerics.rotations import from_rpy, to_quaternion
 from mstmm.runtime.packing.merging.right_angle_snapping import nearest_right_angles
-from tests.support.models import otherwise
+from tests.support.models import non_link_simplifications
 
 ROD = {"mass": 2.0, "center_of_mass": [0.4, 0.1, 0], "inertia": [0.11, 0.2, 0.3]}
 
@@ -44,11 +44,11 @@ STATE = np.array([0.3, -1.1, 0.7]), np.array([1.0, -2.0, 0.5])
 def test_twelve_digits_are_a_quarter_turn() -> None:
     exact = mstmm.compile(arm(math.pi / 2), engine="looped")
     found = mstmm.compile(arm(1.57079632679), engine="looped")
-    assert not otherwise(exact)
-    assert [one.elements for one in otherwise(found)] == [
+    assert not non_link_simplifications(exact)
+    assert [one.elements for one in non_link_simplifications(found)] == [
         ("a",), ("rod1", "tip"), ("rod2", "tip"), ("rod3", "tip"),
     ]  # fmt: skip
-    assert "4.9e-12 rad from right angles" in str(otherwise(found)[0])
+    assert "4.9e-12 rad from right angles" in str(non_link_simplifications(found)[0])
     first, last = (one.accelerations(*STATE) for one in (exact, found))
     plain = mstmm.compile(arm(1.57079632679), engine="looped", simplify=False)
     before = plain.accelerations(*STATE)
@@ -58,15 +58,15 @@ def test_twelve_digits_are_a_quarter_turn() -> None:
 
 def test_a_larger_tolerance_has_to_be_asked_for() -> None:
     scene = arm(1.5708)
-    assert not otherwise(mstmm.compile(scene, engine="looped"))
+    assert not non_link_simplifications(mstmm.compile(scene, engine="looped"))
     rough = mstmm.compile(scene, engine="looped", simplify={"turns": 1e-5})
-    assert len(otherwise(rough)) == 4
+    assert len(non_link_simplifications(rough)) == 4
     again = rough.with_parameters({"rod2.mass": 3.0})
-    assert len(otherwise(again)) == 4
+    assert len(non_link_simplifications(again)) == 4
     nothing: list[Any] = [False, ["welds"], {"turns": False}, {"turns": 0}, {"turns": 1e-12}]
     for none in nothing:
         twelve = mstmm.compile(arm(1.57079632679), engine="looped", simplify=none)
-        assert not otherwise(twelve)
+        assert not non_link_simplifications(twelve)
     wrong: list[Any] = [0.1, -1.0, math.nan, "much"]
     for bad in wrong:
         with pytest.raises(mstmm.SceneError, match="simplify: turns = "):
@@ -99,7 +99,7 @@ def test_a_table_leaves_what_it_does_not_name() -> None:
     ):  # fmt: skip
         words: Any = given
         found = mstmm.compile(scene, engine="looped", simplify=words)
-        assert {one.kind for one in otherwise(found)} == kinds
+        assert {one.kind for one in non_link_simplifications(found)} == kinds
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 import mstmm
 from mstmm.cli.app import app
 from tests.reference.random_scenes import random_scene, random_state
-from tests.support.models import otherwise
+from tests.support.models import non_link_simplifications
 
 Array = NDArray[np.float64]
 SEEDS = range(40, 52)
@@ -58,9 +58,12 @@ def test_drawn_scenes_are_the_same(seed: int) -> None:
     print("seed", seed)
     scene = mstmm.Scene(**random_scene(seed, types=KINDS))
     few, all_ = both(scene)
-    merged = {one.elements for one in otherwise(few)}
+    merged = {one.elements for one in non_link_simplifications(few)}
     assert few.packed_scene.topology.count == len(scene.body) - len(merged)
-    assert few.coordinate_layout.q_names == all_.coordinate_layout.q_names and not otherwise(all_)
+    assert (
+        few.coordinate_layout.q_names == all_.coordinate_layout.q_names
+        and not non_link_simplifications(all_)
+    )
     q, u = random_state(random_scene(seed, types=KINDS), seed)
     assert worst(few.accelerations(q, u, 0.3), all_.accelerations(q, u, 0.3)) < TOLERANCE
     assert worst(few.mass_matrix(q), all_.mass_matrix(q)) < TOLERANCE
@@ -74,7 +77,7 @@ def test_drawn_scenes_are_the_same(seed: int) -> None:
 
 def test_an_angle_of_welded_rods_falls_as_one_body() -> None:
     model = mstmm.compile(arm(3), engine="looped")
-    assert [one.elements for one in otherwise(model)] == [
+    assert [one.elements for one in non_link_simplifications(model)] == [
         ("weld", "rod2", "rod1"), ("splice", "rod3", "rod1"),
     ]  # fmt: skip
     centers = np.array([[0.5, 0.0], [1.0, 0.5], [1.0, 1.5]])
@@ -89,7 +92,7 @@ def test_the_load_of_a_hinge_that_welds_one_body() -> None:
     """Of what hangs behind it, held still by drives: its weight, and the moment of that."""
     held = [one | ({"drive": ["0"]} if one["type"] == "pin" else {}) for one in HINGES]
     model = mstmm.compile(arm(hinge=held), engine="looped")
-    assert len(otherwise(model)) == 2
+    assert len(non_link_simplifications(model)) == 2
     result = model.simulate(0.1, "rk4", step=0.05)
     weight = 2.0 * 9.81
     assert result.force("weld")[-1] == pytest.approx([0, 3 * weight, 0], abs=1e-12)
@@ -107,8 +110,8 @@ def test_the_load_of_a_hinge_that_welds_one_body() -> None:
 )
 def test_a_hinge_that_is_asked_of_or_lets_go_stays(stays: dict[str, Any]) -> None:
     model = mstmm.compile(arm(**stays), engine="looped")
-    assert [one.elements[0] for one in otherwise(model)] == ["splice"]
-    assert otherwise(model)[0].elements == ("splice", "rod3", "rod2")
+    assert [one.elements[0] for one in non_link_simplifications(model)] == ["splice"]
+    assert non_link_simplifications(model)[0].elements == ("splice", "rod3", "rod2")
 
 
 def test_parameters_of_a_body_that_is_part_of_another() -> None:
@@ -116,11 +119,11 @@ def test_parameters_of_a_body_that_is_part_of_another() -> None:
     changes = {"rod2.mass": 5.0, "rod3.center_of_mass[1]": 0.2, "rod2.ends.tip.position[0]": 1.3}
     q, u = np.array([0.3, -0.4]), np.array([1.0, 2.0])
     there = [one.with_parameters(changes) for one in (few, all_)]
-    assert len(otherwise(there[0])) == 2 and not otherwise(there[1])
+    assert len(non_link_simplifications(there[0])) == 2 and not non_link_simplifications(there[1])
     assert worst(there[0].accelerations(q, u), there[1].accelerations(q, u)) < TOLERANCE
     assert worst(there[0].accelerations(q, u), few.accelerations(q, u)) > 0.01
     again = pickle.loads(pickle.dumps(there[0]))
-    assert otherwise(again) == otherwise(there[0])
+    assert non_link_simplifications(again) == non_link_simplifications(there[0])
     masses = np.array([1.0, 4.0])
     runs = [one.simulate_batch((q, u), {"rod2.mass": masses}, t_end=0.1, method="rk4", step=0.01)
             for one in (few, all_)]  # fmt: skip
@@ -141,7 +144,7 @@ def test_what_acts_on_a_part_acts_on_the_whole() -> None:
             event=[{"when": "rod3.tip.y < 1.9", "do": "stop"}],
         )
     )  # fmt: skip
-    assert len(otherwise(few)) == 2
+    assert len(non_link_simplifications(few)) == 2
     runs = [one.simulate(2.0, rtol=1e-11, atol=1e-13) for one in (few, all_)]
     assert runs[0].position("rod3.tip")[-1, 1] == pytest.approx(1.9, abs=1e-9)
     assert runs[0].t[-1] == pytest.approx(runs[1].t[-1], rel=1e-9)
@@ -153,7 +156,7 @@ def test_what_acts_on_a_part_acts_on_the_whole() -> None:
 def test_words_that_are_none_are_refused() -> None:
     with pytest.raises(mstmm.SceneError, match=r"simplify: expected True.*; found 'weld'"):
         mstmm.compile(arm(), simplify=["weld"])
-    assert len(otherwise(mstmm.compile(arm(), simplify=["welds"]))) == 2
+    assert len(non_link_simplifications(mstmm.compile(arm(), simplify=["welds"]))) == 2
     for wrong in (None, 1, [["welds"]]):
         with pytest.raises(mstmm.SceneError, match=r"simplify = .*: expected a list of names"):
             mstmm.compile(arm(), simplify=wrong)  # type: ignore[arg-type]
@@ -165,14 +168,14 @@ def test_what_is_done_or_not_is_said_by_true_or_false(word: str) -> None:
         with pytest.raises(mstmm.SceneError, match=f"simplify: {word}: expected True or False"):
             mstmm.compile(arm(), simplify={word: wrong})
     for given in (0, 1, False, True):
-        merged = len(otherwise(mstmm.compile(arm(), simplify={word: given})))
+        merged = len(non_link_simplifications(mstmm.compile(arm(), simplify={word: given})))
         assert merged == (0 if word == "welds" and not given else 2)
 
 
 def test_where_loops_are_closed_nothing_is_merged_but_couplings_couple_parts() -> None:
     row = {"name": "follows", "expression": "shoulder.q^2 + elbow.q", "equals": 0.9}
     few, all_ = both(arm(coupling=[row]))
-    assert len(otherwise(few)) == 2 and few.loops == all_.loops
+    assert len(non_link_simplifications(few)) == 2 and few.loops == all_.loops
     runs = [one.simulate(0.3, rtol=1e-11, atol=1e-13) for one in (few, all_)]
     for name in ("weld.force", "splice.moment", "rod3.tip.position", "rod2.momentum"):
         values = [run.quantity(name).values[-1] for run in runs]
@@ -185,7 +188,7 @@ def test_where_loops_are_closed_nothing_is_merged_but_couplings_couple_parts() -
     ]  # fmt: skip
     bodies = [ROD | {"name": f"rod{i}"} for i in (1, 2, 3, 4, 5)]
     closed = mstmm.compile(arm(body=bodies, hinge=[*HINGES, *ring]), engine="looped")
-    assert closed.loops.mobility == 1 and not otherwise(closed)
+    assert closed.loops.mobility == 1 and not non_link_simplifications(closed)
 
 
 @pytest.mark.parametrize("level", ["coupled", "one-way"])
@@ -199,7 +202,7 @@ def test_flexible_bodies_hang_on_parts(level: str) -> None:
     bodies = [ROD | {"name": f"rod{i}"} for i in (1, 2, 3, 4, 5)]
     scene = arm(body=bodies, beam=[beam], hinge=[*HINGES[:3], root, *tip])
     few, all_ = both(scene, flexibility=level)
-    merged = [one.elements[1:] for one in otherwise(few)]
+    merged = [one.elements[1:] for one in non_link_simplifications(few)]
     expected = [("rod2", "rod1"), ("rod3", "rod1"), ("rod4", "rod5")]
     assert merged == (expected if level == "coupled" else [])
     q, u = few.initial_state()

@@ -1,4 +1,4 @@
-"""The page, opened without a network: its console is silent, it shows, moves and names bodies under the pointer."""
+"""The page opened without a network: no console errors, motion, a tooltip for each body."""
 
 from __future__ import annotations
 
@@ -53,7 +53,9 @@ def test_a_page(tmp_path: Path) -> None:
             page.value("document.querySelector('#mstmm b').textContent") == "a <b>beam</b> & a rod"
         )
         assert page.value("document.title") == "a <b>beam</b> & a rod"
-        assert page.wait(POINT)  # a body tells what it is while it moves; which one is in front varies
+        assert page.wait(
+            POINT
+        )  # a body tells what it is while it moves; which one is in front varies
         seen = np.asarray(Image.open(io.BytesIO(page.picture())).convert("RGB"))
         assert page.console == []
     canvas = seen[100:400, 250:800].reshape(-1, 3)

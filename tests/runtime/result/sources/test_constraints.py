@@ -8,7 +8,8 @@ import pytest
 import mstmm
 from tests.reference.compare import worst
 from tests.reference.jets import Array
-from tests.support.scenes.constraints import GRAVITY, MASS, compiled, cycloid, disc, governor
+from tests.support.models import compile_scene
+from tests.support.scenes.constraints import GRAVITY, MASS, cycloid, disc, governor
 from tests.support.scenes.gears import pair
 
 TIMES = np.linspace(0.0, 0.3, 4)
@@ -32,7 +33,7 @@ def test_a_disc() -> None:
 
 def test_a_bead() -> None:
     """Of a curve there are the force and the parameter."""
-    result = compiled(cycloid(1.0)).simulate(0.3, output_times=TIMES)
+    result = compile_scene(cycloid(1.0)).simulate(0.3, output_times=TIMES)
     wanted = 0.3 * (result.acceleration("bead") + UP)
     assert worst(quantity(result, "wire.force"), wanted) < 1e-11
     assert worst(quantity(result, "wire.s"), result.q[:, 7]) == 0
@@ -41,7 +42,7 @@ def test_a_bead() -> None:
 
 def test_a_rod() -> None:
     """What a pair of rods puts on the sleeve of a governor, as a stiff spring in their place."""
-    rigid, soft = (compiled(governor(rods)).simulate(0.3, rtol=1e-7, output_times=TIMES)
+    rigid, soft = (compile_scene(governor(rods)).simulate(0.3, rtol=1e-7, output_times=TIMES)
                    for rods in ("constraint", "spring"))  # fmt: skip
     rod, spring = quantity(rigid, "constraint1.load"), quantity(soft, "spring1.effort")
     weight = 2.0 * (rigid.acceleration("sleeve")[:, 2] + GRAVITY)

@@ -9,27 +9,23 @@ import pytest
 
 import mstmm
 from mstmm.runtime.run.external_integrators import METHODS
+from tests.support.models import looped_model
 from tests.support.scenes.constraints import on_a_road
 from tests.support.scenes.gears import planetary
 from tests.support.scenes.linkages import bricard
-from tests.support.scenes.published_mechanisms import Scene
 from tests.system.loops.test_flexible_against_tree import slider_crank as bent_slider_crank
 from tests.system.loops.test_four_bar import linkage
 from tests.system.loops.test_slider_crank import slider_crank
 
 #: Scene and how long it runs, s: laws, repeated rows, shapes, rows of speeds, a coupling.
 MODELS: dict[str, tuple[Callable[[], mstmm.Model], float]] = {
-    "four-bar": (lambda: compiled(linkage("closing_pin")), 0.5),
-    "Bricard": (lambda: compiled(bricard()), 0.2),
-    "a rod that bends": (lambda: compiled(bent_slider_crank()), 0.01),
-    "a disc that rolls": (lambda: compiled(on_a_road()), 0.2),
+    "four-bar": (lambda: looped_model(linkage("closing_pin")), 0.5),
+    "Bricard": (lambda: looped_model(bricard()), 0.2),
+    "a rod that bends": (lambda: looped_model(bent_slider_crank()), 0.01),
+    "a disc that rolls": (lambda: looped_model(on_a_road()), 0.2),
     "gears": (lambda: planetary({"sun": 2.0}), 0.2),
 }
 RTOL = 1e-7
-
-
-def compiled(scene: Scene) -> mstmm.Model:
-    return mstmm.compile(mstmm.Scene(**scene), engine="looped")
 
 
 #: One of each kind of them: what is told where it goes on from, and what is not.
@@ -64,7 +60,7 @@ def test_what_keeps_its_history_begins_anew(method: str) -> None:
 
 def test_the_same_method_errs_alike() -> None:
     """DOP853 of SciPy and that in C, both with the rates of a step's end kept."""
-    model, times = compiled(bricard()), np.linspace(0.0, 2.0, 5)
+    model, times = looped_model(bricard()), np.linspace(0.0, 2.0, 5)
     own, other = (
         model.simulate(2.0, method, rtol=1e-8, output_times=times)
         for method in ("dop853", "scipy-DOP853")

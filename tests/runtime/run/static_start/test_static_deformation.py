@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-import mstmm
 from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure
+from tests.support.models import looped_model
 from tests.system.loops.test_flexible_against_tree import (
     Scene,
     hung,
@@ -31,10 +31,6 @@ def still(scene: Scene, *names: str, **more: Any) -> Scene:
     return scene
 
 
-def compiled(scene: Scene) -> mstmm.Model:
-    return mstmm.compile(mstmm.Scene(**scene), engine="looped")
-
-
 @pytest.mark.parametrize("last, sag", [("pin", 1 / 76.8), ("fixed", 1 / 192)])
 def test_beams_on_two_supports_sag(last: str, sag: float) -> None:
     """By w L^4 / 76.8 EI in the middle between two hinges, 1 / 192 where an end is clamped."""
@@ -49,7 +45,7 @@ def test_beams_on_two_supports_sag(last: str, sag: float) -> None:
         {"name": "end", "type": last, "inboard": "b.tip", "outboard": "cart"},
     ]  # fmt: skip
     scene = {"gravity": [0, -GRAVITY, 0], "body": [cart], "beam": [beam], "hinge": hinges}
-    model = compiled(still(scene))
+    model = looped_model(still(scene))
     seen = model.simulate(0.05, output_times=[0.0, 0.05])
     height = seen.position("b.mid")[:, 1]
     assert height[0] == pytest.approx(-sag * GRAVITY / bending, rel=2e-3)
@@ -62,8 +58,8 @@ def test_a_run_that_damping_settles() -> None:
     del scene["hinge"][0]["initial"]
     scene["hinge"][0]["drive"] = "0.6"
     scene["beam"][0]["damping"] = 0.7
-    settled = compiled(scene).simulate(0.4, rtol=1e-10, output_times=[0.4])
-    q, u = compiled(still(scene)).initial_state()
+    settled = looped_model(scene).simulate(0.4, rtol=1e-10, output_times=[0.4])
+    q, u = looped_model(still(scene)).initial_state()
     assert not u.any()
     np.testing.assert_allclose(q, settled.q[-1], rtol=0, atol=1e-9)
     assert np.abs(q[-2:]).max() > 1e-5
@@ -82,7 +78,7 @@ def test_forces_that_close_the_loop_hold_the_shapes(name: str) -> None:
     scene = still(made())
     for hinge in scene["hinge"]:
         hinge.get("initial", {}).pop("u", None)
-    model = compiled(scene)
+    model = looped_model(scene)
     q, u = model.initial_state()
     layout = model.coordinate_layout
     start = layout.hinges[scene["hinge"][0]["name"]].q_slice
@@ -109,15 +105,15 @@ def test_forces_that_close_the_loop_hold_the_shapes(name: str) -> None:
 def test_a_crank_that_turns_stretches_and_bends_the_rod() -> None:
     """No shape moves or accelerates while the crank keeps its 8 rad/s."""
     scene = still(slider_crank())
-    q, u = compiled(scene).initial_state()
+    q, u = looped_model(scene).initial_state()
     at_rest = slider_crank()
     at_rest["hinge"][0]["initial"].pop("u")
-    bent = compiled(still(at_rest)).initial_state()[0]
+    bent = looped_model(still(at_rest)).initial_state()[0]
     assert abs(u[0] - 8.0) < 1e-12 and not u[-2:].any()
     assert np.abs(q - bent)[-2:].max() > 0.3 * np.abs(bent[-2:]).max()
     scene["hinge"][0]["drive"] = "0.6 + 8*t"
     del scene["hinge"][0]["initial"]
-    driven = compiled(scene)
+    driven = looped_model(scene)
     np.testing.assert_allclose(driven.initial_state()[0], q, atol=1e-12)
     np.testing.assert_allclose(driven.initial_state()[1], u, atol=1e-9)
     rates = driven.accelerations(q, u)
@@ -128,7 +124,7 @@ def test_given_shapes_and_held_hinges_stay() -> None:
     scene = hung()
     scene["beam"][0]["initial"] = {"eta": [0.01, 0.0, -0.004, 0.0]}
     scene["hinge"][2] |= {"hold": True, "initial": {"q": [0.02, -0.03]}}
-    model = compiled(still(scene, "right"))
+    model = looped_model(still(scene, "right"))
     q, u = model.initial_state()
     assert model.loop_start is not None
     first, layout = model.loop_start.start[0], model.coordinate_layout
@@ -142,7 +138,7 @@ def test_given_shapes_and_held_hinges_stay() -> None:
 
 
 def test_a_mesh_starts_bent_too() -> None:
-    model = compiled(still(meshed()))
+    model = looped_model(still(meshed()))
     q, _ = model.initial_state()
     assert model.loop_start is not None
     moved = model.coordinate_layout.modal["bar"].q_slice
@@ -153,4 +149,4 @@ def test_what_is_too_soft_is_told() -> None:
     scene = still(slider_crank(stiffness=0.01))
     scene["hinge"][0]["initial"].pop("u")
     with pytest.raises(NumericalFailure, match='"bar": no static deformation found'):
-        compiled(scene).initial_state()
+        looped_model(scene).initial_state()
