@@ -68,7 +68,6 @@ def soft(**change: Any) -> mstmm.Model:
 
 @pytest.mark.parametrize("change", [{"density": 1e300}, {"young": 1e300}])
 def test_an_elastic_body_beyond_numbers(change: dict[str, float]) -> None:
-    pytest.importorskip("skfem")
     with pytest.raises(
         mstmm.SceneError, match=r'elastic "b".*beyond the range of double precision'
     ):
@@ -77,7 +76,6 @@ def test_an_elastic_body_beyond_numbers(change: dict[str, float]) -> None:
 
 def test_a_static_shape_beyond_the_model_is_said() -> None:
     """A soft elastic body sags by more than its length; its run knows no tolerance to check."""
-    pytest.importorskip("skfem")
     with pytest.raises(
         mstmm.NumericalFailure, match=r'"b": the static deformation .*rotates an end by 1.7'
     ):
@@ -85,7 +83,6 @@ def test_a_static_shape_beyond_the_model_is_said() -> None:
 
 
 def test_a_start_beyond_the_model_is_named() -> None:
-    pytest.importorskip("skfem")
     with pytest.raises(mstmm.NumericalFailure, match=r'"b\.tip" .* section rotates by more than 1'):
         soft(initial={"eta": [0.0, 0.32]}).simulate(1e-3)
 

@@ -140,7 +140,6 @@ def test_ground_and_platform_agree() -> None:
 
 
 def test_python_control_takes_them() -> None:
-    pytest.importorskip("control")
     linear = shaker().linearize(inputs=["base.displacement_acceleration"])
     system = linear.to_control(["mass.ax"])
     assert system.state_labels[2:] == ["base_displacement", "base_displacement'"]

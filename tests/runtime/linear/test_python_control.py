@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
+import control
 import numpy as np
 import pytest
 
 import mstmm
 from mstmm.errors import SceneError
 from tests.support.scenes.linear import hanging_beam, pendulum
-
-control = pytest.importorskip("control")
 
 
 def beam() -> mstmm.Model:

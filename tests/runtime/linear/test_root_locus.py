@@ -54,12 +54,11 @@ def test_motions_go_on_through_a_crossing(tmp_path: Path) -> None:
     rows = list(csv.reader(locus.save(tmp_path / "locus.csv").read_text().splitlines()))
     assert rows[0][:3] == ["pivot.law.stiffness[0]", "1 frequency [Hz]", "1 growth [1/s]"]
     np.testing.assert_array_equal(np.array(rows[1:], float)[:, 1::2], locus.frequency)
-    xarray = pytest.importorskip("xarray")
-    pytest.importorskip("h5netcdf")
+    import xarray
+
     with xarray.open_dataset(locus.save(tmp_path / "locus.nc"), engine="h5netcdf") as data:
         np.testing.assert_array_equal(data.frequency, locus.frequency)
         np.testing.assert_array_equal(data.value, values)
-    pytest.importorskip("matplotlib")
     locus.plot(tmp_path / "locus.png", orders=[1, 2])
     assert (tmp_path / "locus.png").stat().st_size > 10_000
 

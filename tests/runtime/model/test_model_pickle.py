@@ -42,7 +42,6 @@ def test_a_fixed_step_is_judged_as_before() -> None:
 
 
 def test_a_one_way_result_and_a_loaded_one(tmp_path: Path) -> None:
-    pytest.importorskip("h5netcdf")
     run = mstmm.compile(BLADE, flexibility="one-way").simulate(0.5, output_times=[0.1, 0.5])
     loaded: Any = mstmm.load_result(run.save(tmp_path / "run.nc"))
     for again in pickle.loads(pickle.dumps(run)), pickle.loads(pickle.dumps(loaded)):

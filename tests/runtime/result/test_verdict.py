@@ -109,7 +109,6 @@ def test_energies_beyond_what_numbers_hold_are_no_success() -> None:
 
 
 def test_what_a_verdict_was_stays_with_the_file(tmp_path: Path) -> None:
-    pytest.importorskip("h5netcdf")
     run = mstmm.compile(pins(1, [0.3])).simulate(1.0, certify=True)
     back = mstmm.load_result(run.save(tmp_path / "run.nc"))
     assert back.trusted

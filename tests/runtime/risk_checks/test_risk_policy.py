@@ -129,7 +129,6 @@ def test_a_scene_that_speaks_against_itself_is_refused() -> None:
 
 
 def test_ignored_risks_are_not_told_and_do_not_make_a_run_trusted(tmp_path: Path) -> None:
-    pytest.importorskip("h5netcdf")
     run = swinging().simulate(
         5.0, **COARSE, certify=True, execution=mstmm.Execution(on_risk="ignore")
     )
@@ -159,7 +158,6 @@ def test_a_clean_run_has_none() -> None:
 
 def test_a_saved_result_has_the_same(tmp_path: Path) -> None:
     """What only the run knew, and what its file makes again."""
-    pytest.importorskip("h5netcdf")
     pulse = {"on": "rod0", "force": [0, "exp(-((t - 0.5)/0.001)^2)", 0]}
     scene = mstmm.Scene(
         gravity=(0, -9.81, 0), body=[rod("rod0")], load=[pulse],

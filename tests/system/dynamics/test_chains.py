@@ -201,7 +201,6 @@ def test_members_that_are_not_there(runs: tuple[Any, Any], name: str, message: s
 
 
 def test_results_of_chains_go_to_files_and_back(runs: tuple[Any, Any], tmp_path: Path) -> None:
-    pytest.importorskip("xarray")
     again = mstmm.load_result(runs[0].save(tmp_path / "run.nc"))
     assert np.array_equal(again.position("rope[last].tip"), runs[0].position("rope[22].tip"))
     header = runs[0].save(tmp_path / "run.csv").read_text(encoding="utf-8").split("\n", 1)[0]

@@ -120,7 +120,6 @@ def test_large_matrices_are_refused() -> None:
 
 
 def test_a_large_result_is_saved_without_what_follows_from_it(tmp_path: Any) -> None:
-    pytest.importorskip("xarray")
     model = mstmm.compile(scene(rods(5001, {"type": "pin", "axis": [0, 1, 0]})))
     run = model.simulate(0.01, rtol=1e-6, atol=1e-9, output_times=[0.0, 0.01])
     again = mstmm.load_result(run.save(tmp_path / "run.nc"))

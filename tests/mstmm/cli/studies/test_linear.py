@@ -37,7 +37,6 @@ def test_matrices_are_told_and_written(mstmm: Command, folder: Path) -> None:
 
 
 def test_answers_are_told_drawn_and_written(mstmm: Command, folder: Path) -> None:
-    pytest.importorskip("matplotlib")
     done = mstmm("frf", "pendulum.toml", "-i", "pivot.effort", "-q", "rod.tip.vy", "--from", "0.01",
                  "--to", "0.02", "--points", "3", "-o", "frf.csv", "--plot", "bode.png",
                  "--set", "pivot.law.damping[0]=0.2")  # fmt: skip
@@ -71,7 +70,6 @@ unit = "deg"
 
 @pytest.mark.parametrize("command", ["modes", "linearize"])
 def test_pictures_of_both(mstmm: Command, folder: Path, command: str) -> None:
-    pytest.importorskip("matplotlib")
     done = mstmm(command, "pendulum.toml", "--plot", "of.png")
     assert done.code == 0, done.err
     assert "wrote of.png" in done.out and (folder / "of.png").stat().st_size > 10_000
@@ -125,8 +123,8 @@ def test_json_of_both(mstmm: Command) -> None:
 
 
 def test_netcdf_of_both(mstmm: Command) -> None:
-    xarray = pytest.importorskip("xarray")
-    pytest.importorskip("h5netcdf")
+    import xarray
+
     assert mstmm("modes", "pendulum.toml", "-o", "modes.nc").code == 0
     assert mstmm("linearize", "pendulum.toml", "-o", "linear.nc").code == 0
     with xarray.open_dataset("modes.nc", engine="h5netcdf") as data:

@@ -6,18 +6,17 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import meshio
 import numpy as np
 import pytest
 import scipy.sparse.linalg
+import skfem
 
 import mstmm
 from mstmm.errors import EnvironmentFailure, SceneError
 from mstmm.runtime.flexible.elastic import mesh
 from mstmm.runtime.flexible.elastic.modal_elastic import elastic_bodies
 from tests.support.scenes import elastic_bar as bar
-
-meshio = pytest.importorskip("meshio", reason="comes with the extra test")
-skfem = pytest.importorskip("skfem", reason="comes with the extra test")
 
 
 def bar_mesh() -> Any:

@@ -13,8 +13,6 @@ from mstmm.runtime.linear.modes import Modes
 from mstmm.runtime.linear.plots.wireframe import deformed_outlines
 from tests.support.scenes.linear import UNIT, column, hanging, masses, pendulum
 
-pytest.importorskip("matplotlib")
-
 
 def modes_of(scene: mstmm.Scene) -> Modes:
     return mstmm.compile(scene, engine="looped").modes()

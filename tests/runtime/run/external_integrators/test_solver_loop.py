@@ -200,7 +200,6 @@ def test_settings_that_make_no_sense() -> None:
 
 
 def test_cvode_refuses_a_scene_in_which_nothing_moves() -> None:
-    pytest.importorskip("sksundae")
     still = mstmm.Scene(
         gravity=[0, 0, 0],
         body=[{"name": "block", "mass": 1.0, "inertia": [1.0, 1.0, 1.0]}],
