@@ -16,11 +16,19 @@ from sphinx.util.logging import getLogger
 _ALIGNED = re.compile(r"\\(begin|end)\{aligned\}")
 #: Elements that a browser draws wrong with any other number of parts.
 _PARTS = {"msub": 2, "msup": 2, "munder": 2, "mover": 2, "mfrac": 2, "msubsup": 3, "munderover": 3}
+#: "+=" and "-=", which the converter takes apart.
+_ASSIGNMENT = re.compile(
+    r"<mo>(?:<mrow><mo>)?(&#x0002B;|&#x02212;)</mo>(?:</mrow></mo>)?<mo>&#x0003D;</mo>"
+)
+#: Punctuation that is not separated from a formula by the end of a line.
+_CLOSING = tuple(".,;:)")
 _SCRIPT = re.compile(r'<mi mathvariant="script">([A-Z])</mi>')
 
 
 def _inline(translator: Any, node: nodes.math) -> None:
-    translator.body.append(_mathml(node, "inline"))
+    following = node.next_node(descend=False, siblings=True)
+    is_closed = isinstance(following, nodes.Text) and following.startswith(_CLOSING)
+    translator.body.append(_mathml(node, "inline") + ("&#8288;" if is_closed else ""))
     raise nodes.SkipNode
 
 
@@ -45,6 +53,7 @@ def mathml(latex: str, display: str = "inline") -> str:
     and what the converter raises.
     """
     found = convert(_ALIGNED.sub(r"\\\1{align*}", latex), display=display)
+    found = _ASSIGNMENT.sub(r"<mo>\1&#x0003D;</mo>", found)
     if "\\" in found:
         raise ValueError("a command of it is not understood")
     try:
