@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 
 from docutils import nodes
 from latex2mathml.converter import convert
+from sphinx.transforms.post_transforms import SphinxPostTransform
 from sphinx.util.logging import getLogger
 
 #: The converter knows the outer environment alone.
@@ -20,15 +21,15 @@ _PARTS = {"msub": 2, "msup": 2, "munder": 2, "mover": 2, "mfrac": 2, "msubsup": 
 _ASSIGNMENT = re.compile(
     r"<mo>(?:<mrow><mo>)?(&#x0002B;|&#x02212;)</mo>(?:</mrow></mo>)?<mo>&#x0003D;</mo>"
 )
-#: Punctuation that is not separated from a formula by the end of a line.
-_CLOSING = tuple(".,;:)")
+#: Punctuation behind a formula, which a browser would move to the next line.
+_CLOSING = re.compile(r"[.,;:)]+")
 _SCRIPT = re.compile(r'<mi mathvariant="script">([A-Z])</mi>')
 
 
 def _inline(translator: Any, node: nodes.math) -> None:
-    following = node.next_node(descend=False, siblings=True)
-    is_closed = isinstance(following, nodes.Text) and following.startswith(_CLOSING)
-    translator.body.append(_mathml(node, "inline") + ("&#8288;" if is_closed else ""))
+    formula, closing = _mathml(node, "inline"), node.get("closing", "")
+    body = f'<span class="closed">{formula}{closing}</span>' if closing else formula
+    translator.body.append(body)
     raise nodes.SkipNode
 
 
@@ -75,7 +76,24 @@ def _script(letter: re.Match[str]) -> str:
     raise AssertionError(letter[1])
 
 
+class ClosingPunctuation(SphinxPostTransform):
+    """Joins the punctuation behind a formula with it."""
+
+    default_priority = 5
+    formats = ("html",)
+
+    def run(self, **kwargs: Any) -> None:
+        """Called for each page."""
+        for formula in list(self.document.findall(nodes.math)):
+            text = formula.next_node(descend=False, siblings=True)
+            closing = _CLOSING.match(text) if isinstance(text, nodes.Text) else None
+            if closing is not None:
+                formula["closing"] = closing[0]
+                text.parent.replace(text, nodes.Text(text[closing.end() :]))
+
+
 def setup(app: Any) -> dict[str, bool]:
     """Called by Sphinx."""
+    app.add_post_transform(ClosingPunctuation)
     app.add_html_math_renderer("mathml", (_inline, None), (_display, None))
     return {"parallel_read_safe": True, "parallel_write_safe": True}
