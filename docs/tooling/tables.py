@@ -32,6 +32,8 @@ class StackedTables(SphinxPostTransform):
                 continue
             table["classes"].append("stacked")
             headings = list(head.findall(nodes.entry))
+            if len(headings) == 2:  # a name and its description
+                continue
             for row in body.findall(nodes.row):
                 cells = zip(headings, row.findall(nodes.entry), strict=True)
                 for heading, cell in list(cells)[1:]:
