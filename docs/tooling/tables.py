@@ -25,10 +25,12 @@ class StackedTables(SphinxPostTransform):
         """Called for each page."""
         for table in list(self.document.findall(nodes.table)):
             head, body = next(table.findall(nodes.thead), None), next(table.findall(nodes.tbody))
+            is_stacked = head is not None and _has_sentences(body)
             for entry in body.findall(nodes.entry):
-                if len(entry.astext()) <= _MAX_UNBROKEN:
+                text = entry.astext()
+                if len(text) <= _MAX_UNBROKEN and not (is_stacked and " " in text):
                     entry["classes"].append("unbroken")
-            if head is None or not _has_sentences(body):
+            if head is None or not is_stacked:
                 continue
             table["classes"].append("stacked")
             headings = list(head.findall(nodes.entry))
