@@ -45,10 +45,10 @@ class StackedTables(SphinxPostTransform):
 
 
 def _has_sentences(body: nodes.tbody) -> bool:
-    """Whether a row has a long cell and is long itself."""
+    """Whether a row is long and has a long cell besides its name."""
     return any(
         len(row.astext()) > _MAX_ROW
-        and max(len(entry.astext()) for entry in row.findall(nodes.entry)) > _MAX_CELL
+        and max(len(cell.astext()) for cell in list(row.findall(nodes.entry))[1:]) > _MAX_CELL
         for row in body.findall(nodes.row)
     )
 
