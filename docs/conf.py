@@ -18,6 +18,7 @@ extensions = [
     "sphinx.ext.autodoc",
     "tooling.formulas",
     "tooling.drawings",
+    "tooling.tables",
     "tooling.gallery",
     "tooling.docstrings",
     "tooling.members",

@@ -42,10 +42,10 @@ class Moving(Directive):
         page.parent.mkdir(parents=True, exist_ok=True)
         view_of(example, **self.options).save(page)
         frame = (
-            f'<details class="moving"><summary>Let it move</summary>'
+            f'<details class="moving"><summary>Show the animation</summary>'
             f'<iframe src="moving/{example}.html" title="{example} in motion" loading="lazy">'
-            f'</iframe></details><p class="moving"><a href="moving/{example}.html">'
-            "In a window of its own</a></p>"
+            f'</iframe></details><p class="moving"><a href="moving/{example}.html" target="_blank">'
+            "Open in a new tab</a></p>"
         )
         return [nodes.raw("", frame, format="html")]
 

@@ -26,6 +26,8 @@ class MemberGroups(SphinxDirective):
             for member in members:
                 if (directive := _directive(cls, member)) is not None:
                     lines += [f".. {directive}:: {path}.{member}", ""]
+            data = [f"``{member}``" for member in members if _directive(cls, member) is None]
+            lines += ["Attributes: " + ", ".join(data), ""] if data else []
         return self.parse_text_to_nodes("\n".join(lines))
 
 

@@ -71,8 +71,9 @@ PRINTED_FORMULAS: tuple[PrintedFormula, ...] = (
         "(2.22)", "Euler's equations, arbitrary origin", "holds",
         "M (a0z yc - a0y zc) + Ixx domega_x + (Izz - Iyy) omega_y omega_z + ... = Tx",
         "M r_c x a0 + J domega + omega x J omega = T",
-        "All three lines agree term by term, with products of inertia as +int x y dm, a0 the "
-        "acceleration of the body-fixed origin in body axes, and T the moment about that origin.",
+        "All three lines agree term by term. Products of inertia are +int x y dm, a0 is the "
+        "acceleration of the body-fixed origin in body axes, and T is the moment about that "
+        "origin.",
         checks.general_form,
     ),
     PrintedFormula(
@@ -95,9 +96,9 @@ PRINTED_FORMULAS: tuple[PrintedFormula, ...] = (
     PrintedFormula(
         "(2.25) (b)", "axes at the mass centre that need not be fixed in the body", "convention",
         "(2.25) unchanged", "one more term J (W x omega), W the angular velocity of the axes",
-        "The term vanishes for axes fixed in the body and for axes that do not turn (with the "
-        "inertia evaluated afresh at every instant), in general for W parallel to omega; for any "
-        "other axes the printed form is wrong.",
+        "The term vanishes for W parallel to omega: for axes fixed in the body, and for axes that "
+        "do not turn (with the inertia evaluated afresh at every instant). For any other axes the "
+        "printed form is wrong.",
         checks.axes_not_in_body,
     ),
     PrintedFormula(
@@ -201,8 +202,8 @@ After this page you know which printed formulas of the sources are correct, and 
 
 The source is L. Jing, O. Stephansson, *Fundamentals of Discrete Element Methods for Rock
 Engineering*, Elsevier 2007, chapter 2, in an electronic text of the book. `omega` is the angular
-velocity, `domega` its rate in body axes, `a0` the acceleration of the body's origin `X0`, `r_c` the
-mass centre, `J` the inertia tensor about the origin, `ddX` a second derivative.
+velocity, `domega` its rate in body axes, and `a0` the acceleration of the body's origin `X0`. `r_c`
+is the mass centre, `J` the inertia tensor about the origin, and `ddX` a second derivative.
 
 *Holds* means that the derived form agrees identically, *convention* that it agrees with the reading
 in the remark, *misprint* that it does not agree. Every verdict is computed by
