@@ -17,14 +17,14 @@ from pathlib import Path
 from typing import Any
 
 from ..common import measure
-from ..error_control.scenes import draw
+from ..error_control.scenes import draw_scenes
 from . import scenes, trials
 from .report import table
 
 HERE = Path(__file__).resolve().parent
 
 #: Seeds of the scenes on which the rules were set, and of those on which they are judged.
-_TUNING, _JUDGED = 7, 2029
+_TUNING_SEED, _TEST_SEED = 7, 2029
 
 
 def main() -> None:
@@ -39,23 +39,29 @@ def main() -> None:
     options = parser.parse_args()
     seed = options.seed
     if seed is None:
-        seed = _TUNING if options.tuning else _JUDGED
-    drawn = draw(scenes.FAMILIES, options.each, seed)
-    tasks = [(name, one, options.rounds) for name, one in {**scenes.four(), **drawn}.items()]
+        seed = _TUNING_SEED if options.tuning else _TEST_SEED
+    random_scenes = draw_scenes(scenes.FAMILIES, options.each, seed)
+    tasks = [
+        (name, trial, options.rounds)
+        for name, trial in {**scenes.hub_scenes(), **random_scenes}.items()
+    ]
     outcomes: list[trials.Outcome] = []
-    without: dict[str, float] = {}
+    scenes_without_reference: dict[str, float] = {}
     data: dict[str, Any] = {
         "machine": measure.machine(), "set": "tuning" if options.tuning else "judged",
         "each": options.each, "seed": seed, "rounds": options.rounds, "jobs": options.jobs,
-        "scenes_drawn": len(drawn),
+        "scenes_drawn": len(random_scenes),
     }  # fmt: skip
     with get_context("spawn").Pool(options.jobs) as pool:
-        for name, found, floor in pool.imap_unordered(trials.tried, tasks):
-            if not found:
-                without[name] = floor
-            outcomes += found
-            print(*(one.line() for one in found), sep="\n", flush=True)
-            data |= {"without_reference": without, "outcomes": [asdict(x) for x in outcomes]}
+        for name, new_outcomes, floor in pool.imap_unordered(trials.run_scene, tasks):
+            if not new_outcomes:
+                scenes_without_reference[name] = floor
+            outcomes += new_outcomes
+            print(*(trial.text() for trial in new_outcomes), sep="\n", flush=True)
+            data |= {
+                "without_reference": scenes_without_reference,
+                "outcomes": [asdict(trial) for trial in outcomes],
+            }
             text = json.dumps(data, indent=1) + "\n"
             (options.out / "result.json").write_text(text, encoding="utf-8")
             (options.out / "result.md").write_text(table(outcomes, data), encoding="utf-8")

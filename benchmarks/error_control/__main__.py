@@ -35,23 +35,26 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=1, help="scenes at a time")
     parser.add_argument("--out", type=Path, default=HERE, help="folder of result.json, result.md")
     options = parser.parse_args()
-    families = scenes.TUNING if options.tuning else scenes.JUDGED
-    drawn = scenes.draw(families, options.each, options.seed)
-    tasks = [(name, one, options.rounds) for name, one in drawn.items()]
+    families = scenes.TUNING_FAMILIES if options.tuning else scenes.TEST_FAMILIES
+    random_scenes = scenes.draw_scenes(families, options.each, options.seed)
+    tasks = [(name, trial, options.rounds) for name, trial in random_scenes.items()]
     outcomes: list[trials.Outcome] = []
-    without: dict[str, float] = {}
+    scenes_without_reference: dict[str, float] = {}
     data: dict[str, Any] = {
         "machine": measure.machine(), "families": "tuning" if options.tuning else "judged",
         "each": options.each, "seed": options.seed, "rounds": options.rounds,
         "jobs": options.jobs, "scenes_drawn": len(tasks),
     }  # fmt: skip
     with get_context("spawn").Pool(options.jobs) as pool:
-        for name, found, floor in pool.imap_unordered(trials.tried, tasks):
-            if not found:
-                without[name] = floor
-            outcomes += found
-            print(*(one.line() for one in found), sep="\n", flush=True)
-            data |= {"without_reference": without, "outcomes": [asdict(x) for x in outcomes]}
+        for name, new_outcomes, floor in pool.imap_unordered(trials.run_scene, tasks):
+            if not new_outcomes:
+                scenes_without_reference[name] = floor
+            outcomes += new_outcomes
+            print(*(trial.text() for trial in new_outcomes), sep="\n", flush=True)
+            data |= {
+                "without_reference": scenes_without_reference,
+                "outcomes": [asdict(trial) for trial in outcomes],
+            }
             text = json.dumps(data, indent=1) + "\n"
             (options.out / "result.json").write_text(text, encoding="utf-8")
             (options.out / "result.md").write_text(table(outcomes, data), encoding="utf-8")

@@ -19,14 +19,14 @@ from pathlib import Path
 
 from ..common import measure
 from .cases import CASES
+from .comparison import Limits, compare
 from .report import page, table
-from .side_by_side import Limits, compared
 
 HERE = Path(__file__).resolve().parent
 DOCS = HERE.parents[1] / "docs"
 
 
-def arguments() -> ArgumentParser:
+def command_parser() -> ArgumentParser:
     """What the command understands."""
     parser = ArgumentParser(
         "python -m benchmarks.scene_suite", description=str(__doc__).split("\n")[0]
@@ -47,10 +47,10 @@ def arguments() -> ArgumentParser:
     return parser
 
 
-def main(given: list[str] | None = None) -> None:
+def main(arguments: list[str] | None = None) -> None:
     """Measure; write result.json, result.md and the picture after every scene."""
-    parser = arguments()
-    options = parser.parse_args(given)
+    parser = command_parser()
+    options = parser.parse_args(arguments)
     if unknown := [name for name in options.scene if name not in CASES]:
         parser.error(f"no scene {unknown[0]!r}; there are {', '.join(CASES)}")
     methods = tuple(name for name in options.methods.split(",") if name)
@@ -58,27 +58,31 @@ def main(given: list[str] | None = None) -> None:
     if options.quick:
         limits = Limits(min(5.0, options.budget), 0.2, 1, 4, methods)
     file = options.out / "result.json"
-    kept = {}
+    stored = {}
     if file.exists():
-        kept = {one["case"]: one for one in json.loads(file.read_text())["results"]}
+        stored = {result["case"]: result for result in json.loads(file.read_text())["results"]}
     warnings.simplefilter("ignore")  # of integrators that struggle
     for name in [] if options.plot else options.scene or list(CASES):
-        kept[name] = compared(
+        stored[name] = compare(
             CASES[name], limits, not options.no_peers, lambda text: print(text, flush=True)
         )
-        print(*(f"{name}: left out: {why}" for why in kept[name]["missing"]), sep="\n", flush=True)
-        results = [kept[one] for one in CASES if one in kept]
-        measure.save(file, results, unit="CPU ms of one run", rounds=limits.rounds)
+        print(
+            *(f"{name}: left out: {reason}" for reason in stored[name]["missing"]),
+            sep="\n",
+            flush=True,
+        )
+        results = [stored[result] for result in CASES if result in stored]
+        measure.save_record(file, results, unit="CPU ms of one run", rounds=limits.rounds)
     record = json.loads(file.read_text())
     print(table(record))
-    places = [(options.out / "result.md", options.out / "result.png")]
+    pages = [(options.out / "result.md", options.out / "result.png")]
     if options.out == HERE:
-        places.append(
+        pages.append(
             (DOCS / "benchmarks" / "scene-comparison.md", DOCS / "images" / "standing.png")
         )
     from .picture import draw
 
-    for text, picture in places:
+    for text, picture in pages:
         draw(record, picture)
         text.write_text(page(record, os.path.relpath(picture, text.parent)), encoding="utf-8")
 

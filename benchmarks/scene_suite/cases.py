@@ -11,21 +11,21 @@ from ..stiff import scenes as stiff
 from ..stiff.cases import Case
 
 #: Bodies of the long chain, and how far its first rod is turned at the start, rad.
-_LINKS, _TURNED = 100, 0.3
+_LINK_COUNT, _INITIAL_ANGLE = 100, 0.3
 #: Rods on bushings: how many, N/m, damping ratio.
 _BUSHINGS = (10, 1e8, 0.01)
 
 
 def long_chain() -> rigid.Scene:
     """A hundred rods of 1 m hanging in a plane, turned in one piece and let go."""
-    still = [[0.0]] * _LINKS
-    return rigid.hanging(rigid.planar(_LINKS), [[_TURNED], *still[1:]], still)
+    zeros = [[0.0]] * _LINK_COUNT
+    return rigid.hanging_chain(rigid.planar(_LINK_COUNT), [[_INITIAL_ANGLE], *zeros[1:]], zeros)
 
 
 CASES = {case.name: case for case in (
     Case("arm", "arm of three rods on pins, not stiff", rigid.swinging_arm, 10.0, ("rod2.tip",)),
     Case("balls", "three rods on balls", rigid.swinging_balls, 10.0, ("rod2.tip",)),
-    Case("chain", f"chain of {_LINKS} rods", long_chain, 2.0, (f"rod{_LINKS - 1}.tip",)),
+    Case("chain", f"chain of {_LINK_COUNT} rods", long_chain, 2.0, (f"rod{_LINK_COUNT - 1}.tip",)),
     Case("bushings", f"{_BUSHINGS[0]} rods on stiff bushings, 1e{math.log10(_BUSHINGS[1]):g} N/m",
          partial(stiff.bushed_rods, *_BUSHINGS), 1.0, (f"rod{_BUSHINGS[0] - 1}.tip",),
          bushings=_BUSHINGS),
