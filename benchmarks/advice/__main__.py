@@ -1,10 +1,9 @@
-"""Whether an advised model keeps what was asked, and what it costs beside the cheapest one.
+"""Error and cost of advised models, compared with the cheapest model.
 
     python -m benchmarks.advice [--tuning] [--each N] [--seed N] [--rounds N] [--jobs N]
 
-Four scenes of a hub with a beam, and scenes drawn afresh (`--tuning`: with the seed on which
-the rules were set).  Processor time of whole warm calls, the least of alternating rounds, on the
-looped engine.
+Four scenes of a hub with a beam, and random scenes (`--tuning`: with the seed used to set the
+rules).  Minimum CPU time of whole warm calls in alternating rounds, looped engine.
 """
 
 from __future__ import annotations
@@ -23,14 +22,14 @@ from .report import table
 
 HERE = Path(__file__).resolve().parent
 
-#: Seeds of the scenes on which the rules were set, and of those on which they are judged.
+#: Seeds of the scenes used to set and to test the rules.
 _TUNING_SEED, _TEST_SEED = 7, 2029
 
 
 def main() -> None:
     """Run all; print, and write result.json and result.md, after every scene."""
     parser = ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--tuning", action="store_true", help="scenes on which rules were set")
+    parser.add_argument("--tuning", action="store_true", help="scenes used to set the rules")
     parser.add_argument("--each", type=int, default=4, help="scenes of each family")
     parser.add_argument("--seed", type=int, default=None)
     parser.add_argument("--rounds", type=int, default=7, help="alternating rounds of times")
@@ -48,7 +47,7 @@ def main() -> None:
     outcomes: list[trials.Outcome] = []
     scenes_without_reference: dict[str, float] = {}
     data: dict[str, Any] = {
-        "machine": measure.machine(), "set": "tuning" if options.tuning else "judged",
+        "machine": measure.machine(), "set": "tuning" if options.tuning else "test",
         "each": options.each, "seed": seed, "rounds": options.rounds, "jobs": options.jobs,
         "scenes_drawn": len(random_scenes),
     }  # fmt: skip

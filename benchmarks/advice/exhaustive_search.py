@@ -1,5 +1,5 @@
-"""The cheapest model that meets an error, found by trying all: levels and shapes of every body,
-each by several methods over their tolerances."""
+"""Exhaustive search of the cheapest model that meets an error: levels and shape functions of all
+bodies, several methods, all tolerances."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from mstmm.runtime.chart.planar_model import planar_level
 from mstmm.runtime.result.flexible.modal_energy import modal_frequencies
 from mstmm.runtime.result.one_way.result import OneWayResult
 
-#: Samples at which errors are looked at: others than an advice looks at.
+#: Number of times at which errors are compared, different from those of an advice.
 SAMPLES = 241
 
 #: Tolerances of runs, with a hundredth of each as the absolute one; of those that show what a model
@@ -41,7 +41,7 @@ ATOL_PART, _MODEL_ERROR_RTOL, _REFERENCE_METHODS = (
     (("rodas5p", 1e-9), ("dop853", 1e-10), ("auto", 1e-9)),
 )
 
-#: Parts of a beam in the truth of one that is split.
+#: Parts of a split beam in the reference.
 _PARTS = 16
 
 #: Steps after which a run is given up; models that are tried of one scene.
@@ -54,7 +54,7 @@ _MAX_COST_RATIO, _MAX_MODEL_COST_RATIO = 6.0, 12.0
 
 @dataclass(frozen=True)
 class Reference:
-    """What the richest model does, and how far two methods are apart."""
+    """Solution of the richest model, and the difference of two methods."""
 
     numbers: np.ndarray
     error: float
@@ -64,7 +64,7 @@ class Reference:
 
 @dataclass(frozen=True)
 class Run:
-    """A run of a model: its error and processor time of the call, s."""
+    """A run of a model: its error and CPU time, s."""
 
     model: str
     method: str
@@ -79,8 +79,7 @@ class Run:
 def run_timed(
     model: mstmm.Model, t_end: float, method: str, **options: Any
 ) -> tuple[mstmm.Result, float] | None:
-    """A run and the processor time of the call, with the elastic response where there is one; None
-    where it does not reach the end."""
+    """A run and its CPU time, with the elastic response if there is one; None if it fails."""
     times = np.linspace(0.0, t_end, SAMPLES)
     method_settings = mstmm.methods.Method(method, max_steps=_MAX_STEPS)
     start_time = time.process_time()
@@ -140,7 +139,7 @@ def _with_splittable_beams(scene: mstmm.Scene, beam_names: set[str]) -> mstmm.Sc
 def _best_agreement(
     model: mstmm.Model, measure: Renaming, t_end: float
 ) -> tuple[float, np.ndarray, np.ndarray] | None:
-    """How far the two runs are apart that agree best, and numbers and coordinates of one."""
+    """Difference of the two runs that agree best, with numbers and coordinates of one."""
     runs = [
         run_and_time[0]
         for name, rtol in _REFERENCE_METHODS
@@ -159,7 +158,7 @@ def _best_agreement(
 
 
 def candidate_models(base: mstmm.Scene) -> Iterator[tuple[str, mstmm.Scene]]:
-    """Every level and number of shapes of every body; of many bodies all alike."""
+    """Scenes with every level and number of shapes per body; for many bodies all alike."""
     bodies = Bodies(base)
     choices_of_bodies = {
         name: list(_body_choices(richest)) for name, richest in bodies.richest.items()
@@ -193,8 +192,7 @@ def _body_choices(richest: BodyModel) -> Iterator[BodyModel]:
 
 
 def single_runs(truth: Reference, t_end: float, max_error: float, min_error: float) -> list[Run]:
-    """Runs of every model that errs by less than `loosest` by itself, by every method, from loose
-    to tight."""
+    """Runs of all models with a model error below `max_error`, by all methods, loose to tight."""
     model_runs: list[tuple[float, str, mstmm.Model, float]] = []
     for name, scene in candidate_models(truth.base):
         try:
@@ -243,7 +241,7 @@ def _error(truth: Reference, result: mstmm.Result) -> float:
 
 
 def cheapest(runs: list[Run], target: float, all_tighter: bool) -> Run | None:
-    """The cheapest run that errs by no more; `sure`: as do all tighter ones of its curve."""
+    """Cheapest run that meets the target; `all_tighter`: all tighter ones of its curve too."""
     accurate = [run for run in runs if run.error <= target]
     if all_tighter:
         accurate = [

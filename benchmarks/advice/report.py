@@ -1,4 +1,4 @@
-"""Counts over all outcomes, as a page."""
+"""Page of counts over all outcomes."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from typing import Any
 
 from .trials import Outcome
 
-#: What is counted: in words, when it holds, and in how many of a hundred it is aimed at.
+#: Text, criterion and target share in percent of each count.
 COUNTS: tuple[tuple[str, Callable[[Outcome], bool | None], int], ...] = (
-    ("true error at most what was asked", lambda trial: trial.is_met, 95),
+    ("true error at most the target", lambda trial: trial.is_met, 95),
     ("time at most 2 times the cheapest sure model", lambda trial: trial.is_within(2.0), 80),
     ("time at most 3 times the cheapest sure model", lambda trial: trial.is_within(3.0), 0),
     (
-        "time at most 2 times the cheapest run, by luck too",
+        "time at most 2 times the cheapest run, including accidental ones",
         lambda trial: trial.is_within(2.0, True),
         0,
     ),
@@ -22,20 +22,20 @@ COUNTS: tuple[tuple[str, Callable[[Outcome], bool | None], int], ...] = (
 
 
 def share(outcomes: Sequence[Outcome], criterion: Callable[[Outcome], bool | None]) -> str:
-    """How many, as 45 of 50 (90 %)."""
+    """Share as text: 45 of 50 (90 %)."""
     values = [value for trial in outcomes if (value := criterion(trial)) is not None]
     part = 100 * sum(values) / len(values) if values else 0.0
     return f"{sum(values)} of {len(values)} ({part:.0f} %)"
 
 
 def table(outcomes: Sequence[Outcome], data: dict[str, Any]) -> str:
-    """The page: counts by error asked for, by family, scenes A to D, what has failed."""
+    """Page: counts by target error and family, scenes A to D, exceptions."""
     hub_outcomes = [trial for trial in outcomes if len(trial.scene) == 1]
     random = [trial for trial in outcomes if len(trial.scene) > 1]
     target = sorted({trial.target for trial in outcomes}, reverse=True)
     machine = data["machine"]
     lines = [
-        "# Advice beside the cheapest model",
+        "# Advised and cheapest models",
         "",
         f"{len({trial.scene for trial in random})} scenes of {data['scenes_drawn']} drawn, "
         f"{data['each']} of each family, seed {data['seed']} ({data['set']} set).  "
@@ -46,7 +46,7 @@ def table(outcomes: Sequence[Outcome], data: dict[str, Any]) -> str:
         "Scenes whose beams are split (no model of the ladder is enough) are compared with sixteen "
         "parts and have no cheapest model.",
         "",
-        "| | aim | all | " + " | ".join(f"{trial:.0e}" for trial in target) + " |",
+        "| | target | all | " + " | ".join(f"{trial:.0e}" for trial in target) + " |",
         "|---|---|---|" + "---|" * len(target),
     ]
     for text, criterion, aim in COUNTS:
@@ -56,7 +56,7 @@ def table(outcomes: Sequence[Outcome], data: dict[str, Any]) -> str:
         ]
         goal = f"{aim} %" if aim else ""
         lines.append(f"| {text} | {goal} | {share(random, criterion)} | {' | '.join(cells)} |")
-    lines += ["", "| family | error kept | time within 2 | median of time / cheapest | median of "
+    lines += ["", "| family | target met | time within 2 | median of time / cheapest | median of "
               "time of the scene as given / advised |", "|---|---|---|---|---|"]  # fmt: skip
     for family in dict.fromkeys(trial.family for trial in random):
         members = [trial for trial in random if trial.family == family]
@@ -67,7 +67,10 @@ def table(outcomes: Sequence[Outcome], data: dict[str, Any]) -> str:
             f"| {family} | {' | '.join(cells)} | {_median_text(ratios)} | {_median_text(savings)} |"
         )
     lines += ["", "Scenes A to D, a hub with a clamped beam:", ""]
-    lines += ["| scene | asked | true error | advised | time / cheapest |", "|---|---|---|---|---|"]
+    lines += [
+        "| scene | target | true error | advised | time / cheapest |",
+        "|---|---|---|---|---|",
+    ]
     lines += [
         f"| {trial.scene} | {trial.target:.0e} | {trial.error:.1e} | {trial.advised} | "
         f"{'-' if trial.ratio is None else f'{trial.ratio:.2f}'} |"
@@ -76,12 +79,12 @@ def table(outcomes: Sequence[Outcome], data: dict[str, Any]) -> str:
     exceptions = [trial for trial in outcomes if not trial.is_met or trial.is_within(2.0) is False]
     lines += [
         "",
-        "Not kept, or more than twice as dear:",
+        "Target not met, or more than twice the cost:",
         "",
         *(f"    {trial.text()}" for trial in exceptions),
     ]
     if data["without_reference"]:
-        lines += ["", "Without a reference that is good enough: "
+        lines += ["", "Without a sufficient reference: "
                   + ", ".join(data["without_reference"])]  # fmt: skip
     return "\n".join(lines) + "\n"
 

@@ -1,4 +1,4 @@
-"""Scenes that are reduced: four of a hub with a beam, and families that are drawn afresh.
+"""Scenes for model reduction: four of a hub with a beam, and random families.
 
 A family is a function of a random generator and gives a scene dictionary and the end of its run
 (s), as those of the wanted errors, of which the flexible ones are drawn here too.
@@ -56,7 +56,7 @@ def _log(rng: np.random.Generator, low: float, high: float) -> float:
 
 
 def hub_arms(rng: np.random.Generator) -> Sample:
-    """The four scenes and what lies between and around them."""
+    """Scenes like the four, between and around them."""
     inertia, bending_stiffness, period = (
         _log(rng, -1, 1),
         _log(rng, 0.3, 3),

@@ -1,4 +1,4 @@
-"""What is advised for one scene, beside the truth and the cheapest model found by trying all."""
+"""Advice for one scene, compared with a reference and with the cheapest model."""
 
 from __future__ import annotations
 
@@ -20,30 +20,29 @@ from .exhaustive_search import (
     single_runs,
 )
 
-#: Errors that are asked for, in parts of the scene's length.
+#: Target errors relative to the length of the scene.
 TARGET_ERRORS = (1e-2, 1e-3, 1e-4)
 
-#: A reference that is off by more than this part of the smallest error asked for is none.
+#: Largest error of a reference relative to the smallest target.
 _MAX_REFERENCE_ERROR_RATIO = 0.1
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """One scene, one error asked for.
+    """One scene, one target error.
 
     Attributes:
-        scene, asked: which.
-        error: true error of the advised model with the advised setting, against the richest model;
-            where that is split, against sixteen parts, and no model of the ladder is its rival.
-        told: the error that the advice says.
-        cpu_s: of that run, the least of the rounds.
-        best, best_cpu_s: the cheapest sure run of any model, and its time from the same rounds;
-            None where there is none.
-        lucky_cpu_s: of the cheapest run of all, lucky hits included.
-        advised: choices and setting in words.
-        whole: models were compared over the whole run.
-        spent_s: of the clock, that the advice took.
-        saving: time of the scene as given over that of the advised one, as the advice says.
+        error: true error of the advised model and setting against the richest model; where beams
+            are split, against sixteen parts, without a cheapest model.
+        estimated_error: error reported by the advice.
+        cpu_s: minimum CPU time of that run.
+        cheapest_sure, cheapest_sure_cpu_s: cheapest run whose tighter settings meet the target
+            too, or None.
+        cheapest_cpu_s: time of the cheapest run, including accidentally accurate ones.
+        advised: choices and setting as text.
+        covers_whole_run: whether models were compared over the whole run.
+        advice_s: wall time of the advice.
+        saving: time of the given scene over that of the advised one, by the advice.
     """
 
     scene: str
@@ -66,7 +65,7 @@ class Outcome:
 
     @property
     def is_met(self) -> bool:
-        """The true error is at most what was asked."""
+        """The true error is at most the target."""
         return self.error <= self.target
 
     @property
@@ -80,7 +79,7 @@ class Outcome:
         return None if cheapest_s is None else self.cpu_s <= factor * cheapest_s
 
     def text(self) -> str:
-        """All of it in words."""
+        """One line of text."""
         ratio = "" if self.ratio is None else f", {self.ratio:.2f} times {self.cheapest_sure}"
         return (
             f"{self.scene}: target {self.target:.0e}, estimate {self.estimated_error:.1e}, "
@@ -93,7 +92,7 @@ def measure_advice(
     name: str, scene: mstmm.Scene, t_end: float, truth: Reference, runs: list[Run], target: float,
     rounds: int,
 ) -> Outcome:  # fmt: skip
-    """The advice, and its run and the cheapest ones in alternating rounds."""
+    """Measure the advised run and the cheapest ones in alternating rounds."""
     start_time = time.monotonic()
     advice = mstmm.advise(scene, t_end, error=target, rounds=2)
     advice_s = time.monotonic() - start_time
@@ -140,8 +139,8 @@ def measure_advice(
 
 
 def run_scene(task: tuple[str, Sample, int]) -> tuple[str, list[Outcome], float]:
-    """A scene with its outcomes and the error of its reference; no outcomes where that is no
-    good."""
+    """A scene with its outcomes and the error of its reference; no outcomes if that is
+    not sufficient."""
     name, (tables, t_end), rounds = task
     scene = mstmm.Scene(**tables)
     truth = compute_reference(scene, t_end)

@@ -1,4 +1,4 @@
-"""What single runs cost and how far they err: every adaptive method over its tolerances."""
+"""Cost and error of single runs: every adaptive method over its tolerances."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from mstmm.runtime.result.error_measure import Coordinates
 TOLERANCES = tuple(10.0**-k for k in range(2, 13))
 ATOL_PART = 0.01
 
-#: Steps after which a run is given up: one that may be the cheapest, and one for the reference.
+#: Step limits of candidate runs and of reference runs.
 _MAX_STEPS, _MAX_REFERENCE_STEPS = 40_000, 300_000
 
 #: Runs whose distance to each other is the reference's error: method and relative tolerance.
@@ -25,16 +25,16 @@ _REFERENCES = (
     ("kvaerno5", 1e-10), ("rodas5p", 1e-11),
 )  # fmt: skip
 
-#: A method is followed no further where it costs so many times the cheapest run that errs by less.
+#: Cost ratio to the cheapest more accurate run at which a method is stopped.
 _MAX_COST_RATIO = 20.0
 
-#: Samples at which errors are looked at.
+#: Number of times at which errors are compared.
 SAMPLES = 101
 
 
 @dataclass(frozen=True)
 class Reference:
-    """The truth and how far it may be off."""
+    """Reference solution and its error."""
 
     numbers: np.ndarray
     error: float
@@ -44,7 +44,7 @@ class Reference:
 
 @dataclass(frozen=True)
 class Run:
-    """A single run: its error and the processor time of the call, the least of its repeats."""
+    """A single run: its error and minimum CPU time."""
 
     method: str
     rtol: float
@@ -53,17 +53,17 @@ class Run:
 
 
 def adaptive_methods() -> tuple[str, ...]:
-    """All of the package that choose their steps."""
+    """Names of all adaptive methods of the package."""
     return (*(name for name in names() if get(name).adaptive), AUTO)
 
 
 def sample_times(t_end: float) -> np.ndarray:
-    """The samples of a run."""
+    """Output times of a run."""
     return np.linspace(0.0, t_end, SAMPLES)
 
 
 def run_timed(model: mstmm.Model, t_end: float, **options: Any) -> tuple[mstmm.Result, float]:
-    """A run and the processor time of its call, s."""
+    """A run and its CPU time, s."""
     output_times = sample_times(t_end)
     start_time = time.process_time()
     result = model.simulate(t_end, output_times=output_times, **options)
@@ -73,7 +73,7 @@ def run_timed(model: mstmm.Model, t_end: float, **options: Any) -> tuple[mstmm.R
 def run_once(
     model: mstmm.Model, t_end: float, method: str, rtol: float, max_steps: int = _MAX_STEPS
 ) -> tuple[mstmm.Result, float] | None:
-    """One run of a method at a tolerance; None where it does not reach the end in `most` steps."""
+    """One run of a method at a tolerance; None where it does not reach the end in `max_steps`."""
     try:
         method_settings = mstmm.methods.Method(method, max_steps=max_steps)
         result, cpu_s = run_timed(
@@ -110,7 +110,7 @@ def compute_reference(model: mstmm.Model, t_end: float) -> Reference | None:
 def single_runs(
     model: mstmm.Model, t_end: float, reference: Reference, min_error: float, repeats: int
 ) -> list[Run]:
-    """Every method from loose to tight, until it errs by less than `least` or is hopeless."""
+    """Runs of every method from loose to tight, up to `min_error` or to excessive cost."""
     runs: list[Run] = []
     for method in adaptive_methods():
         for rtol in TOLERANCES:
@@ -130,7 +130,7 @@ def single_runs(
 def _repeat_competitive(
     model: mstmm.Model, t_end: float, runs: list[Run], repeats: int
 ) -> list[Run]:
-    """The least of several times for every run that may be the cheapest for some error."""
+    """Minimum of several times for each run that may be the cheapest for some error."""
     repeated = []
     for candidate in runs:
         cheaper = [rival.cpu_s for rival in runs if rival.error <= candidate.error]

@@ -1,4 +1,4 @@
-"""Scenes drawn afresh: families on which the rule was set, and others on which it is judged.
+"""Random scenes: families used to set the rule, and others to test it.
 
 Every family is a function of a random generator and gives a scene dictionary and the end of its run
 (s).  Lengths in m, masses in kg, angles in rad.

@@ -1,9 +1,9 @@
-"""How often `simulate(error=...)` says that an error is met which is not: on unseen scenes.
+"""How often `simulate(error=...)` wrongly reports that a target is met, on further scenes.
 
     python -m benchmarks.error_control.survey [--each N] [--seed N]
 
-Every scene is asked for several errors and compared with a much tighter run, which a tighter run of
-another method confirms.  What it costs is not looked at.
+Each scene runs with several target errors and is compared with a much tighter run, which a run of
+another method confirms.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from .cheapest_setting import Reference, compute_reference, run_timed
 from .scenes import draw_scenes
 from .unseen_scenes import UNSEEN_FAMILIES
 
-#: Errors that are asked for, and how far one that is met may be above what was asked.
+#: Target errors, and the tolerated ratio of error and target.
 TARGET_ERRORS, TOLERATED_FACTOR = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8), 1.5
 
-#: A reference that is off by more than this part of what was asked for judges nothing.
+#: Largest error of a reference relative to the target.
 _MAX_REFERENCE_ERROR_RATIO = 0.1
 
 
 @dataclass
 class Count:
-    """What the errors that were asked for became."""
+    """Counts of requests and outcomes."""
 
     requests: int = 0
     reported_met: int = 0
@@ -44,7 +44,7 @@ class Count:
 
 
 def main() -> None:
-    """Print every miss, and the counts over all."""
+    """Print all misses and the counts."""
     parser = ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--each", type=int, default=5, help="scenes of each of twelve families")
     parser.add_argument("--seed", type=int, default=39)
@@ -71,7 +71,7 @@ def main() -> None:
 def check_target_error(
     name: str, model: mstmm.Model, t_end: float, reference: Reference, target: float, count: Count
 ) -> None:
-    """Ask a scene for an error and count; print what is not met or not kept."""
+    """Run a scene with a target error and count; print failures."""
     result, seconds = run_timed(model, t_end, error=target)
     achieved = result.achieved_error
     assert achieved is not None

@@ -1,4 +1,4 @@
-"""What `simulate(error=...)` does on one scene, beside the cheapest single run."""
+"""`simulate(error=...)` on one scene, compared with the cheapest single run."""
 
 from __future__ import annotations
 
@@ -9,28 +9,26 @@ import mstmm
 from .cheapest_setting import Reference, Run, compute_reference, run_once, run_timed, single_runs
 from .scenes import Sample
 
-#: Errors that are asked for.
+#: Target errors.
 TARGET_ERRORS = (1e-3, 1e-5, 1e-7)
 
-#: A reference that is off by more than this part of the smallest error asked for is none.
+#: Largest error of a reference relative to the smallest target.
 _MAX_REFERENCE_ERROR_RATIO = 0.1
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """One scene, one error asked for.
+    """One scene, one target error.
 
     Attributes:
-        scene, asked: which.
-        met: what the result says of itself.
-        estimate: reported; None where nothing is known.
-        error: true error, by the reference, whose own is `floor`.
-        cpu_s: of the call, the least of the rounds.
-        best: the cheapest single run that errs by no more than asked; None where there is none.
-        best_cpu_s: its time, from the same rounds.
-        sure_cpu_s: of the cheapest one of which all tighter ones of its method err no more, too.
-        runs: how many there were.
-        how: method and tolerance that were kept.
+        reports_met: whether the result reports that the target is met.
+        estimate: reported error; None if unknown.
+        error: true error by the reference, whose own error is `reference_error`.
+        cpu_s: minimum CPU time of the call.
+        cheapest, cheapest_cpu_s: cheapest single run that meets the target, or None.
+        cheapest_sure_cpu_s: the same among runs whose tighter settings meet the target too.
+        runs: number of runs.
+        setting: final method and tolerance.
     """
 
     scene: str
@@ -58,7 +56,7 @@ class Outcome:
 
     @property
     def is_met(self) -> bool:
-        """The true error is at most three times what was asked."""
+        """The true error is at most three times the target."""
         return self.error <= 3 * self.target
 
     @property
@@ -72,7 +70,7 @@ class Outcome:
         return None if cheapest_s is None else self.cpu_s <= factor * cheapest_s
 
     def text(self) -> str:
-        """All of it in words."""
+        """One line of text."""
         estimate_text = "none" if self.estimate is None else f"{self.estimate:.1e}"
         ratio = "" if self.ratio is None else f", {self.ratio:.2f} times {self.cheapest}"
         return (
@@ -86,7 +84,7 @@ def measure_target_error(
     name: str, model: mstmm.Model, t_end: float, reference: Reference, runs: list[Run],
     target: float, rounds: int,
 ) -> Outcome:  # fmt: skip
-    """Both in alternating rounds."""
+    """Measure both in alternating rounds."""
     accurate = [run for run in runs if run.error <= target]
     cheapest = min(accurate, key=lambda run: run.cpu_s) if accurate else None
     sure_runs = [run for run in accurate if _all_tighter(run, runs, target)]
@@ -115,7 +113,7 @@ def measure_target_error(
 
 
 def _all_tighter(run: Run, runs: list[Run], target: float) -> bool:
-    """Whether this run and all tighter ones of its method err by no more."""
+    """Whether this run and all tighter ones of its method meet the target."""
     return all(
         other.error <= target
         for other in runs
@@ -124,8 +122,8 @@ def _all_tighter(run: Run, runs: list[Run], target: float) -> bool:
 
 
 def run_scene(task: tuple[str, Sample, int]) -> tuple[str, list[Outcome], float]:
-    """A scene with its outcomes and the error of its reference; no outcomes where that is no
-    good."""
+    """A scene with its outcomes and the error of its reference; no outcomes if that is
+    not sufficient."""
     name, (tables, t_end), rounds = task
     model = mstmm.compile(mstmm.Scene(**tables), engine="looped")
     reference = compute_reference(model, t_end)

@@ -1,4 +1,4 @@
-"""Scenes of kinds that neither set the rule of `simulate(error=...)` nor judged it before.
+"""Random scenes of kinds that were used neither to set nor to test the rule of target errors.
 
 Switched satellites, rolling, gears, closed loops, bounces, dry friction, springs between bodies,
 tops, curves, ropes, releases and tabulated torques.  Lengths in m, masses in kg, angles in rad.

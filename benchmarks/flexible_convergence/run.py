@@ -2,7 +2,7 @@
 
     python benchmarks/flexible_convergence/run.py [--plot]
 
-Largest distance of the tip from chains of rigid segments (extrapolated; the tests keep them) and
+Largest distance of the tip from chains of rigid segments (extrapolated; stored in the tests) and
 relative error of frequencies against finite elements, for every frame and basis.
 """
 
@@ -120,7 +120,7 @@ def frequency_errors() -> dict[str, Any]:
 
 
 def weightless_welded_beams(basis: str, n: int) -> scenes.Scene:
-    """The welded beams at rest, without weight, in frames that suit the shapes."""
+    """The welded beams at rest, without weight, in suitable frames."""
     frame_keys = {"frame": "chord"} if basis == "simply-supported" else {}
     return {**motions.welded(basis, n, **frame_keys), "gravity": [0.0, 0.0, 0.0]}
 

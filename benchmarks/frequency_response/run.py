@@ -2,9 +2,8 @@
 
     python benchmarks/frequency_response/run.py [--quick] [--plot]
 
-CPU time of one frequency of many, contenders in alternating rounds: mstmm's sweep,
-python-control (if it is there) on the A and B that mstmm gives, and a dense complex solution with
-M, C and K.  Building what each needs is not counted.
+CPU time of one frequency in alternating rounds: mstmm's sweep, python-control, if installed, on
+the A and B of mstmm, and a dense complex solution with M, C and K.  Set-up is not counted.
 """
 
 from __future__ import annotations
@@ -23,14 +22,14 @@ from common import measure  # noqa: E402
 
 import mstmm  # noqa: E402
 
-#: Largest of the lengths that tools with matrices are asked for.
+#: Largest number of bodies for programs with matrices.
 MAX_DENSE = 200
 SIZES = (10, 50, 200, 1000, 10_000)
-TARGET = "mstmm / python-control at 50 bodies, where 0.1 was asked"
+TARGET = "mstmm / python-control at 50 bodies (target 0.1)"
 
 
 def chain(bodies: int) -> mstmm.Scene:
-    """Rods that hang from pins with springs and dampers."""
+    """Hanging rods on pins with springs and dampers."""
     rod = {"mass": 1.0, "center_of_mass": [0.5, 0, 0], "inertia": [0.01, 1 / 12, 1 / 12],
            "ends": {"tip": [1, 0, 0]}}  # fmt: skip
     hinge = {"type": "pin", "axis": [0, 0, 1], "law": {"stiffness": 200.0, "damping": 0.5}}
@@ -41,7 +40,7 @@ def chain(bodies: int) -> mstmm.Scene:
 
 
 def response_calls(bodies: int) -> tuple[int, dict[str, Callable[[], np.ndarray]]]:
-    """How many frequencies, and who computes the response at all of them."""
+    """Number of frequencies, and calls that compute the response at all of them."""
     model = mstmm.compile(chain(bodies), engine="looped")
     linear = model.linearize(np.zeros(model.nq), inputs=["rope[0].hinge.effort"], disturbances=())
     omega = np.linspace(1, 30, max(100, 20_000 // bodies))
@@ -66,7 +65,7 @@ def response_calls(bodies: int) -> tuple[int, dict[str, Callable[[], np.ndarray]
 
 
 def measure_all(quick: bool) -> list[dict[str, Any]]:
-    """Microseconds a frequency, and how far answers differ from mstmm's."""
+    """Microseconds per frequency, and the relative difference from mstmm."""
     results = []
     for bodies in SIZES[:2] if quick else SIZES:
         count, work = response_calls(bodies)
@@ -82,8 +81,8 @@ def measure_all(quick: bool) -> list[dict[str, Any]]:
 
 
 def table(results: list[dict[str, Any]]) -> str:
-    """Markdown: best of the rounds."""
-    lines = ["| bodies | tool | one frequency, us | a body, ns | beside mstmm | apart |",
+    """Markdown: minimum of the rounds."""
+    lines = ["| bodies | tool | one frequency, us | ns per body | ratio to mstmm | difference |",
              "|---|---|---|---|---|---|"]  # fmt: skip
     own_us = {r["bodies"]: min(r["us"]) for r in results if r["tool"] == "mstmm"}
     for r in results:

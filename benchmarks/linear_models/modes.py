@@ -1,12 +1,11 @@
-"""The 20 slowest natural motions of chains, beside SciPy's eigsh on matrices of the same scene.
+"""The 20 lowest normal modes of chains, compared with SciPy's eigsh on matrices of the scene.
 
     python benchmarks/linear_models/modes.py [--quick]
 
-CPU time of a call, contenders in alternating rounds.  eigsh (shift and invert at 0) has two kinds
-of matrices, which are not counted: M and K in the coordinates of hinges, as `linearize` gives them,
-where M is full; and those that somebody would assemble by hand for this chain, sparse because they
-are of every body apart: displacements beside the ground, joined by stiffness, or for hinges without
-give by stiffness of 1e9 in place of them.
+CPU time of a call in alternating rounds.  eigsh (shift and invert at 0) gets two kinds of matrices,
+whose assembly is not counted: M and K in hinge coordinates as `linearize` returns them, where M is
+full; and sparse matrices of absolute displacements as written by hand for this chain, where a
+stiffness of 1e9 replaces rigid constraints.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ import mstmm  # noqa: E402
 COUNT, LENGTH, TARGET = 20, 0.1, 0.1
 OWN, FULL, SPARSE = "mstmm", "eigsh, hinges (full M)", "eigsh, every body (sparse)"
 SIZES, ROUNDS = (1000, 3000, 10_000), 4
-#: Up to so many coordinates full matrices are asked; time goes with the cube.
+#: Largest number of coordinates for full matrices, whose time grows with its cube.
 MAX_FULL = 10_000
 STIFFNESSES = [1e6, 2e6, 3e6, 1e4, 2e4, 3e4]  # along x, y, z in N/m, about x, y, z in N m/rad
 PIN, CONSTRAINT_STIFFNESS = 1e4, 1e9
@@ -60,7 +59,7 @@ def scene(kind: str, bodies: int) -> mstmm.Scene:
 
 
 def assemble_matrices(kind: str, bodies: int) -> tuple[Any, Any]:
-    """Sparse K and M of a chain, each body by itself."""
+    """Sparse K and M of a chain in absolute coordinates of the bodies."""
     if kind == "masses on springs":
         diagonal, off_diagonal = np.full(bodies, 200.0), np.full(bodies - 1, -100.0)
         diagonal[-1] = 100.0
@@ -76,9 +75,7 @@ def assemble_matrices(kind: str, bodies: int) -> tuple[Any, Any]:
     mass = center.T @ np.diag([1, 1, 1, 1e-4, 8.5e-4, 8.5e-4]) @ center
     directions = [0, 1, 5] if planar else range(6)
     mass, tip = (matrix[np.ix_(directions, directions)] for matrix in (mass, tip))
-    inboard_neighbour = sp.diags(
-        [np.ones(bodies - 1)], [-1]
-    )  # how far hinges open: own motion, inboard tip's
+    inboard_neighbour = sp.diags([np.ones(bodies - 1)], [-1])  # relative displacements of hinges
     hinge_openings = sp.kron(sp.identity(bodies), np.eye(len(directions))) - sp.kron(
         inboard_neighbour, tip
     )
@@ -108,9 +105,9 @@ def timed_calls(kind: str, bodies: int) -> dict[str, Work]:
 
 
 def measure_all(quick: bool) -> list[dict[str, Any]]:
-    """Seconds a call, and how far frequencies lie apart."""
+    """Seconds per call, and the relative difference of frequencies."""
     results = []
-    for kind in ("masses on springs", "rods on pins", "six directions of give"):
+    for kind in ("masses on springs", "rods on pins", "six elastic directions"):
         for bodies in SIZES[:1] if quick else SIZES:
             work = timed_calls(kind, bodies)
             omega = {name: call() for name, call in work.items()}
@@ -133,9 +130,9 @@ def measure_all(quick: bool) -> list[dict[str, Any]]:
 
 
 def table(results: list[dict[str, Any]]) -> str:
-    """Markdown: best of the rounds."""
+    """Markdown: minimum of the rounds."""
     own_seconds = {(r["chain"], r["bodies"]): min(r["s"]) for r in results if r["tool"] == OWN}
-    lines = ["| chain | bodies | tool | s | a body, us | mstmm beside it | asked | apart |",
+    lines = ["| chain | bodies | tool | s | us per body | mstmm / tool | target | difference |",
              "|---|---|---|---|---|---|---|---|"]  # fmt: skip
     for r in results:
         seconds, is_own = min(r["s"]), r["tool"] == OWN

@@ -1,10 +1,10 @@
-"""Linear models of arms at a state, called from Python, beside Pinocchio's derivatives.
+"""Linear models of arms at a state, called from Python, compared with Pinocchio's derivatives.
 
     python benchmarks/linear_models/run.py [--quick]
 
-CPU time of a call, contenders in alternating rounds: mstmm on code compiled for the scene and on
-the looped engine, and pin.computeABADerivatives (if pin is there), which finds the same numbers.
-Building models and compiling are not counted.
+CPU time of a call in alternating rounds: mstmm on the fused and the looped engine, and
+pin.computeABADerivatives, if installed, which computes the same derivatives.  Building and
+compiling are not counted.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ Work = dict[str, Callable[[], object]]
 
 
 def own_calls(scene: scenes.Scene, q: np.ndarray, u: np.ndarray) -> tuple[Work, np.ndarray]:
-    """Our calls, and the slopes of accelerations (nu, 2 nu) by q and u that they find."""
+    """Calls of mstmm, and their derivatives of accelerations (nu, 2 nu) by q and u."""
     fused, looped = (
         mstmm.compile(mstmm.Scene(**scene), engine=engine) for engine in ("fused", "looped")
     )
-    for model in (fused, looped):  # the first call compiles, or looks for code
+    for model in (fused, looped):  # the first call compiles or loads code
         model.linearize(q, u)
         model.derivatives(q, u)
     work: Work = {
@@ -48,7 +48,7 @@ def own_calls(scene: scenes.Scene, q: np.ndarray, u: np.ndarray) -> tuple[Work, 
 
 
 def peer_calls(scene: scenes.Scene, q: np.ndarray, u: np.ndarray) -> tuple[Work, np.ndarray | None]:
-    """Pinocchio's call and what it finds; nothing where pin is missing."""
+    """Call of Pinocchio and its derivatives; nothing if pin is not installed."""
     try:
         import pinocchio as pin
     except ImportError:
@@ -74,7 +74,7 @@ def peer_calls(scene: scenes.Scene, q: np.ndarray, u: np.ndarray) -> tuple[Work,
 
 
 def measure_all(quick: bool) -> list[dict[str, Any]]:
-    """Microseconds a call, and how far the slopes lie apart."""
+    """Microseconds per call, and the relative difference of the derivatives."""
     results = []
     for name, build in SCENES.items():
         scene = without_laws(build())
@@ -96,7 +96,7 @@ def measure_all(quick: bool) -> list[dict[str, Any]]:
 
 
 def without_laws(scene: scenes.Scene) -> scenes.Scene:
-    """Without what the peer does not differentiate, but inertia of drives."""
+    """Scene without laws except drive inertia, which Pinocchio differentiates too."""
     hinges = [
         hinge | {"law": {"inertia": hinge.get("law", {}).get("inertia", 0.0)}}
         for hinge in scene["hinge"]
@@ -105,8 +105,11 @@ def without_laws(scene: scenes.Scene) -> scenes.Scene:
 
 
 def table(results: list[dict[str, Any]]) -> str:
-    """Markdown: best of the rounds."""
-    lines = ["| scene | call | us | beside pin | asked | apart |", "|---|---|---|---|---|---|"]
+    """Markdown: minimum of the rounds."""
+    lines = [
+        "| scene | call | us | ratio to pin | target | difference |",
+        "|---|---|---|---|---|---|",
+    ]
     best_us = {(r["scene"], r["call"]): min(r["us"]) for r in results}
     for r in results:
         us, peer_us = min(r["us"]), best_us.get((r["scene"], PEER))

@@ -1,4 +1,4 @@
-"""Trials of guards of flexible bodies, on scenes drawn afresh."""
+"""Trials of the checks of flexible bodies on random scenes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ FREQUENCIES = (3.51602, 22.0345, 61.6972, 120.902)
 
 
 def beam(name: str = "beam", **more: Any) -> Scene:
-    """Of 1 m, 1 kg and 1 N m2."""
+    """Beam of 1 m, 1 kg and 1 N m2."""
     return {"name": name, "length": 1.0, "mass_per_length": 1.0, "bending_stiffness": 1.0, **more}
 
 
@@ -25,7 +25,7 @@ def _tip(run: Any) -> np.ndarray:
 
 
 def _relative_tip_error(run: Any, exact: Any) -> float:
-    """Of the tip, as a part of its largest deflection."""
+    """Error of the tip relative to its largest deflection."""
     if not run.success:
         return math.inf
     own_tip, reference_tip = _tip(run), _tip(exact)
@@ -34,7 +34,7 @@ def _relative_tip_error(run: Any, exact: Any) -> float:
 
 
 def spinning_linear_beam(rng: Rng) -> Trial:
-    """A linear beam at a hub of some radius that is spun up within some time, and nods a little."""
+    """A linear beam at a hub of some radius in spin-up."""
     ratio, ramp = log_uniform(rng, 0.03, 2.0), float(rng.uniform(4.0, 12.0))
     spin, radius = ratio * FIRST, float(rng.uniform(0, 1))
     angle = f"{spin / ramp!r}*(t^2/2 + ({ramp!r}/(2*pi))^2*(cos(2*pi*t/{ramp!r}) - 1))"
@@ -63,7 +63,7 @@ def spinning_linear_beam(rng: Rng) -> Trial:
 
 
 def light_hub(rng: Rng) -> Trial:
-    """A one-way beam on a hub that is turned to and fro."""
+    """A one-way beam on a hub that oscillates."""
     inertia_ratio, time = log_uniform(rng, 0.03, 300.0), float(rng.uniform(2.0, 6.0))
     center = {"name": "hub", "mass": 1.0, "inertia": [inertia_ratio / 3] * 3}
     effort = f"where(t < {time!r}, {0.02 * (inertia_ratio + 1) / 3!r}*sin(2*pi*t/{time!r}), 0)"
@@ -85,7 +85,7 @@ def light_hub(rng: Rng) -> Trial:
 
 
 def _run_at_rest(tested: Any) -> tuple[Any, tuple[str, ...]]:
-    """A moment at rest."""
+    """Short run from the static equilibrium."""
     equilibrium = tested.equilibrium(), np.zeros(tested.nu)
     return run_trial(tested, 1e-9, initial=equilibrium, output_times=[0.0, 1e-9])
 

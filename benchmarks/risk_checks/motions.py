@@ -1,4 +1,4 @@
-"""Trials of guards of steps, loads, masses and rotations, on scenes drawn afresh."""
+"""Trials of the checks of steps, loads, masses and rotations on random scenes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Rng = np.random.Generator
 
 
 def log_uniform(rng: Rng, low: float, high: float) -> float:
-    """A number between two others, evenly over their powers."""
+    """Random number, uniform in its logarithm."""
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
@@ -63,8 +63,8 @@ def implicit_step(rng: Rng) -> Trial:
 
 
 def pulse_in_angle(rng: Rng) -> Trial:
-    """A push that is narrow in an angle, by steps that are chosen; sometimes between comparisons,
-    with other laws, or seen at a few times only."""
+    """A load that is narrow in an angle, with adaptive steps; some within comparisons, with other
+    laws, or with few output times."""
     width, position = log_uniform(rng, 1e-4, 1.0), float(rng.uniform(2.0, 6.0))
     push = f"{0.5 / width / math.sqrt(math.pi)!r}*exp(-((q - {position!r})/{width!r})^2)"
     if rng.random() < 0.3:
@@ -85,7 +85,7 @@ def pulse_in_angle(rng: Rng) -> Trial:
 
 
 def pulse_in_time(rng: Rng) -> Trial:
-    """A push that is narrow in time, by fixed steps."""
+    """A load that is narrow in time, with fixed steps."""
     step, position = log_uniform(rng, 1e-3, 5e-2), float(rng.uniform(0.5, 1.5))
     ratio = log_uniform(rng, 0.02, 20)
     width = ratio * step
@@ -97,7 +97,7 @@ def pulse_in_time(rng: Rng) -> Trial:
 
 
 def heavy_tip(rng: Rng) -> Trial:
-    """Light rods before a heavy one, or behind it; the error of accelerations, by refinement."""
+    """Light rods with a heavy one; error of accelerations by refinement."""
     count, mass = int(rng.integers(3, 10)), log_uniform(rng, 1e2, 1e13)
     position = count - 1 if rng.random() < 0.8 else int(rng.integers(count))
     bodies = [
@@ -122,7 +122,7 @@ def heavy_tip(rng: Rng) -> Trial:
 
 
 def gimbal_top(rng: Rng) -> Trial:
-    """A free top on three angles that passes their lock, by fixed and by chosen steps."""
+    """A free top on three angles near gimbal lock, with fixed and adaptive steps."""
     distance = log_uniform(rng, 1e-6, 0.5)
     spin = float(rng.uniform(0.5, 2.0))
     angular_velocity = [spin * math.sin(distance), spin * math.cos(distance), 0.0]
@@ -144,7 +144,7 @@ def gimbal_top(rng: Rng) -> Trial:
     return trial(distance, run, risks, float(error) / (1e-5 if fixed else 10 * rtol))
 
 
-def loose_tolerance_balls(rng: Rng) -> Trial:
+def loose_balls(rng: Rng) -> Trial:
     """Tumbling bodies on balls, tolerances from loose to tight."""
     count, rtol = int(rng.integers(1, 4)), log_uniform(rng, 1e-8, 3e-2)
     bodies = [rod(f"rod{i}", inertia=(0.05, 0.12, 0.1)) for i in range(count)]

@@ -1,4 +1,4 @@
-"""False alarms and misses of every guard, as a page."""
+"""Page of false-alarm and miss rates of the checks."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from .trials import Trial
 
 @dataclass(frozen=True)
 class CheckCase:
-    """A guard at one time, on one family of scenes: the name of its risk, whether before the run or
-    behind it, what is drawn, and what counts as wrong."""
+    """A check before or after a run on a family of scenes: name of its risk, random parameter, and
+    the error that counts as wrong."""
 
     risk: str
     before_run: bool
@@ -22,12 +22,12 @@ class CheckCase:
 
 
 def is_reported(case: CheckCase, trial: Trial) -> bool:
-    """Whether it said so."""
+    """Whether the check reported its risk."""
     return case.risk in (trial.reported_before if case.before_run else trial.reported_after)
 
 
 def counts(case: CheckCase, trials: Sequence[Trial]) -> dict[str, int]:
-    """Runs that are wrong and fine, alarms among the fine ones, misses among the wrong ones."""
+    """Numbers of wrong and correct runs, misses and false alarms."""
     wrong = [trial for trial in trials if trial.is_wrong and (case.before_run or not trial.failed)]
     correct = [trial for trial in trials if not trial.is_wrong]
     return {
@@ -40,15 +40,15 @@ def counts(case: CheckCase, trials: Sequence[Trial]) -> dict[str, int]:
 def table(cases: Sequence[CheckCase], trials: Mapping[str, Sequence[Trial]], data: Any) -> str:
     """The page."""
     lines = [
-        "# Rates of the guards",
+        "# False-alarm and miss rates of the checks",
         "",
         f"{data['each']} scenes of each family, seed {data['seed']} "
         f"({'on which limits were set' if data['tuning'] else 'limits were set on another'}).  "
-        "A run is wrong where the stated error, by an accurate run, is above the stated bound, or "
-        "where it failed; those that failed, and said so themselves, do not count behind the run.  "
-        "*Unseen*: wrong runs of which no guard at all said anything.",
+        "A run is wrong if its error against an accurate run exceeds the stated bound, or if it "
+        "failed; failed runs do not count for checks after the run.  *Unreported*: wrong runs "
+        "without any report.",
         "",
-        "| guard | when | family | drawn | wrong is | missed | false alarms | unseen |",
+        "| check | when | family | parameter | wrong if | missed | false alarms | unreported |",
         "|---|---|---|---|---|---|---|---|",
     ]
     for case in cases:

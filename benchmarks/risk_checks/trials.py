@@ -1,4 +1,4 @@
-"""A run whose guard is judged: what it said before and behind it, and how wrong it really is."""
+"""A run with the risks reported before and after it, and its true error."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ Scene = dict[str, Any]
 
 @dataclass(frozen=True)
 class Trial:
-    """What came out of one.
+    """Outcome of one run.
 
     Attributes:
-        drawn: the number that was drawn on both sides of where the method fails.
-        before, after: names of the risks that were told before the run, and behind it.
-        error: of the run, by an accurate one, as a part of what counts as wrong.
-        failed: it did not come to its end, and said so.
+        drawn_value: random parameter, on both sides of the value at which the method fails.
+        reported_before, reported_after: names of the risks reported before and after the run.
+        error: error against an accurate run, relative to the bound of a wrong run.
+        failed: whether the run reported a failure.
     """
 
     drawn_value: float
@@ -38,22 +38,22 @@ class Trial:
 
     @property
     def is_wrong(self) -> bool:
-        """Whether the run is really wrong: also where it failed or gave no number."""
+        """Whether the run is wrong, failed or is not finite."""
         return not self.error <= 1.0
 
 
 def build_model(scene: Scene, **options: Any) -> mstmm.Model:
-    """A scene by the looped engine."""
+    """Model on the looped engine."""
     return mstmm.compile(mstmm.Scene(**{"gravity": [0, 0, 0], **scene}), engine="looped", **options)
 
 
 def unique_names(risks: Iterable[Risk]) -> tuple[str, ...]:
-    """Each once."""
+    """Names without repetition."""
     return tuple(dict.fromkeys(risk.name for risk in risks))
 
 
 def run_trial(tested: mstmm.Model, t_end: float, **settings: Any) -> tuple[Result, tuple[str, ...]]:
-    """A run, and the names of what was told before it; of its fixed step the run itself tells."""
+    """A run and the names of the risks reported before it."""
     q, u = settings.get("initial") or tested.initial_state()
     method_settings = {key: value for key, value in settings.items() if key in ("method", "step")}
     reported = check_before_run(
@@ -64,7 +64,7 @@ def run_trial(tested: mstmm.Model, t_end: float, **settings: Any) -> tuple[Resul
 
 
 def trial(drawn_value: float, run: Result, risks: tuple[str, ...], error: float) -> Trial:
-    """The trial of a run with this error, in parts of what is wrong."""
+    """Outcome of a run with an error relative to the bound of a wrong run."""
     reported_after = unique_names(
         tuple(risk for risk in run.risks if not risk.seen_before_run and risk.invalidates)
     )
@@ -74,7 +74,7 @@ def trial(drawn_value: float, run: Result, risks: tuple[str, ...], error: float)
 
 
 def coordinate_error(run: Result, exact: Result) -> float:
-    """Largest error of all coordinates at the times that both have: rad, or parts of the motion."""
+    """Largest error of all coordinates at common times: rad, or relative to the motion."""
     if not run.success:
         return math.inf
     measure = Coordinates(exact.model)

@@ -188,6 +188,13 @@ def measure_robots(quick: bool) -> list[dict[str, Any]]:
     return rows
 
 
+def fastest_peer(row: dict[str, Any], results: list[dict[str, Any]]) -> dict[str, Any]:
+    """Row of the fastest call that a row is compared with."""
+    rows = [r for r in results if r["robot"] == row["robot"]]
+    peers = [r for r in rows if r["call"].startswith(COMPARISONS[row["call"]][0])]
+    return min(peers, key=lambda r: min(r["s"]))
+
+
 def table(results: list[dict[str, Any]]) -> str:
     """Markdown: a row per robot and call, ratio of the minima and of the medians."""
     lines = [
@@ -197,10 +204,7 @@ def table(results: list[dict[str, Any]]) -> str:
     pairs = [(robot, call) for robot in ROBOTS for call in COMPARISONS]
     rows_by_pair = {(row["robot"], row["call"]): row for row in results}
     for row in (rows_by_pair[pair] for pair in pairs if pair in rows_by_pair):
-        peer, target = COMPARISONS[row["call"]]
-        robot_rows = [candidate for candidate in results if candidate["robot"] == row["robot"]]
-        peer_rows = [candidate for candidate in robot_rows if candidate["call"].startswith(peer)]
-        fastest = min(peer_rows, key=lambda candidate: min(candidate["s"]))
+        target, fastest = COMPARISONS[row["call"]][1], fastest_peer(row, results)
         min_ratio, median_ratio = (f(row["s"]) / f(fastest["s"]) for f in (min, statistics.median))
         difference = "" if np.isnan(row["difference"]) else f"{row['difference']:.1e}"
         limit = "" if target is None else f"{target:g}"

@@ -1,12 +1,12 @@
-"""Standing charts: eight scenes, mstmm's methods and their peers, CPU time against achieved error.
+"""Cost charts of eight scenes: CPU time over achieved error, compared with other programs.
 
     python -m benchmarks.scene_suite [SCENE ...] [--rounds N] [--budget S] [--quick] [--plot]
 
 Each scene is charted as `mstmm chart` does it: every method of mstmm over its tolerances or steps
-against a reference whose own error is stated, on both engines; the error is that of the place of
-one end (m) at the end of the run.  Peers run the same scene and are held against the same
-reference.  Then the cheapest settings of everybody are timed again in alternating rounds of one
-process: CPU time of one whole warm call that gives the end of the motion, the least of the rounds.
+against a reference of known error, on both engines; the error is that of the final position of one
+end, m.  Other programs run the same scene against the same reference.  Then the cheapest settings
+of all programs are timed in alternating rounds of one process: minimum CPU time of one whole warm
+call that returns the final state.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ DOCS = HERE.parents[1] / "docs"
 
 
 def command_parser() -> ArgumentParser:
-    """What the command understands."""
+    """Parser of the command line."""
     parser = ArgumentParser(
         "python -m benchmarks.scene_suite", description=str(__doc__).split("\n")[0]
     )
@@ -37,13 +37,13 @@ def command_parser() -> ArgumentParser:
     parser.add_argument("--budget", type=float, default=Limits.budget,
                         help="clock s of mstmm's settings, for each scene")  # fmt: skip
     parser.add_argument("--limit", type=float, default=Limits.run,
-                        help="CPU s of a peer's run behind which its curve ends")  # fmt: skip
+                        help="CPU s of a run of another program that ends its curve")  # fmt: skip
     parser.add_argument("--methods", default="", help="mstmm's, by name, with commas; all of them")
-    parser.add_argument("--no-peers", action="store_true", help="mstmm alone")
+    parser.add_argument("--no-peers", action="store_true", help="mstmm only")
     parser.add_argument(
-        "--quick", action="store_true", help="few settings and rounds: does it run?"
+        "--quick", action="store_true", help="few settings and rounds, to test the script"
     )
-    parser.add_argument("--plot", action="store_true", help="only draw what the JSON holds")
+    parser.add_argument("--plot", action="store_true", help="pages from the stored JSON")
     return parser
 
 
@@ -61,7 +61,7 @@ def main(arguments: list[str] | None = None) -> None:
     stored = {}
     if file.exists():
         stored = {result["case"]: result for result in json.loads(file.read_text())["results"]}
-    warnings.simplefilter("ignore")  # of integrators that struggle
+    warnings.simplefilter("ignore")  # of integrators with difficulties
     for name in [] if options.plot else options.scene or list(CASES):
         stored[name] = compare(
             CASES[name], limits, not options.no_peers, lambda text: print(text, flush=True)

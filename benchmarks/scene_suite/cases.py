@@ -1,4 +1,4 @@
-"""The eight scenes: scene, time, and the end whose place at the end is compared."""
+"""The eight scenes: scene, duration, and the end whose final position is compared."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _BUSHINGS = (10, 1e8, 0.01)
 
 
 def long_chain() -> rigid.Scene:
-    """A hundred rods of 1 m hanging in a plane, turned in one piece and let go."""
+    """A hundred rods of 1 m hanging in a plane, rotated as a whole and released."""
     zeros = [[0.0]] * _LINK_COUNT
     return rigid.hanging_chain(rigid.planar(_LINK_COUNT), [[_INITIAL_ANGLE], *zeros[1:]], zeros)
 
@@ -39,5 +39,5 @@ CASES = {case.name: case for case in (
          partial(rigid.example, "satellite_panels"), 10.0, ("east.tip",)),
 )}  # fmt: skip
 
-#: Those of links on pins and balls without laws, which every tool for rigid trees can run.
+#: Scenes of links on pins and balls without laws, for programs of rigid trees.
 TREES = ("arm", "balls", "chain")

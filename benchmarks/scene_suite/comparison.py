@@ -1,4 +1,4 @@
-"""A case with everybody: points of one kind, judged against one reference, timed in one go."""
+"""All programs on a case: points against one reference, timed together."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from . import mstmm_runs as mstmm_runs
 from . import peers
 
 OWN = "mstmm"
-#: Errors (m) for which the cheapest settings are told.
+#: Target errors of the recommended settings, m.
 TARGET_ERRORS = (1e-4, 1e-6)
-#: A curve of a peer ends where it errs by less than this, m, for the second time.
+#: Error, m; the second smaller one ends the curve of a program.
 _SMALLEST_ERROR = 1e-8
 
 Call = Callable[[], object]
@@ -32,7 +32,7 @@ Call = Callable[[], object]
 
 @dataclass(frozen=True)
 class Limits:
-    """How much time there is: clock s of mstmm's survey, CPU s of a peer's run after which no
+    """Limits: wall time s of mstmm's survey, CPU s of a peer's run after which no
     tighter one is tried, alternating rounds, every how many-th setting of a peer is run, and which
     of mstmm's methods (all for none)."""
 
@@ -44,7 +44,7 @@ class Limits:
 
 
 def compare(case: Case, limits: Limits, with_peers: bool, report: Callable[[str], None]) -> Any:
-    """Plain values: reference, points of every tool, what is recommended, who did not run."""
+    """Plain data: reference, points of all programs, recommended settings, missing programs."""
     missing: list[str] = []
     own_runs = mstmm_runs.survey_case(case, limits.budget, report, limits.methods)
     reference = own_runs.reference
@@ -83,7 +83,7 @@ def compare(case: Case, limits: Limits, with_peers: bool, report: Callable[[str]
 def evaluate_curve(
     curve: Curve, own_runs: mstmm_runs.OwnRuns, limits: Limits
 ) -> Iterator[tuple[Setting, tuple[Point, Call]]]:
-    """The points of a peer's curve, loose to tight, and how each is run again."""
+    """Points of a curve, loose to tight, with their runs."""
     accurate_count = 0
     for value, run in list(curve.settings)[:: limits.stride]:
         setting = Setting(curve.tool, curve.variant, value, peers.has_fixed_steps(curve))
@@ -92,12 +92,12 @@ def evaluate_curve(
             read_positions, _ = run()
             cpu_s = time.process_time() - start_time
             error = float(np.linalg.norm(read_positions()[-1] - own_runs.exact))
-        except Exception as failure:  # one that gives up is a result too
+        except Exception as failure:  # a failed run is a result too
             text = (str(failure).strip().splitlines() or [type(failure).__name__])[0]
             yield setting, (Point(setting, failure=text[:120]), run)
             continue
         if not math.isfinite(error):
-            yield setting, (Point(setting, failure="places that are not numbers"), run)
+            yield setting, (Point(setting, failure="positions not finite"), run)
             continue
         yield setting, (Point(setting, error, cpu_s, 1), run)
         accurate_count += error < max(_SMALLEST_ERROR, own_runs.reference.smallest_resolved_error)
@@ -108,7 +108,7 @@ def evaluate_curve(
 def time_fronts(
     fronts: Mapping[str, Sequence[Point]], calls: Mapping[Setting, Call], rounds: int
 ) -> dict[str, list[Point]]:
-    """The points of all fronts with the least of their times in alternating rounds."""
+    """Points of all fronts with minimum times of alternating rounds."""
     settings = {setting_key(p): p.setting for tool_points in fronts.values() for p in tool_points}
     work = {key: partial(measure.call_time, calls[setting]) for key, setting in settings.items()}
     samples = measure.sample_rounds(work, rounds)
@@ -119,7 +119,7 @@ def time_fronts(
 
 
 def setting_key(point: Point) -> str:
-    """Of a setting, among those of all tools."""
+    """Unique key of a setting."""
     return f"{point.method}|{point.model}|{point.setting.value!r}"
 
 

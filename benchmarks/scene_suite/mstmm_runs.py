@@ -1,4 +1,4 @@
-"""mstmm's methods on a case: reference and points as `mstmm chart` finds them, at the end alone."""
+"""mstmm's methods on a case: reference and points as `mstmm chart` finds them, at the end only."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ from mstmm.runtime.chart.trial_run import Runs
 from ..common import measure
 from ..stiff.cases import Case
 
-#: Families of integrators of others, which are peers.
+#: Families of external integrators.
 EXTERNAL_FAMILIES = FAMILIES[-2:]
-#: Engines, which stand where a chart has levels of model; the first one has every scene.
+#: Engines, in place of the model levels of a chart; the first one runs all scenes.
 LOOPED, FUSED = "looped", "fused"
-#: Up to so many speeds there is code of the scene's own too, compiled before anything is timed.
+#: Largest number of speeds for the fused engine.
 _MAX_FUSED_SPEEDS = 20
 
 
 @dataclass(frozen=True)
 class OwnRuns:
-    """What is known of a case: models by engine, reference and the watched end's place in it (3,),
-    m, and every setting of mstmm's methods, timed once."""
+    """Runs of mstmm: models by engine, reference, reference position of the end (3,), m, and all
+    settings, timed once."""
 
     models: dict[str, mstmm.Model]
     reference: Reference
@@ -41,7 +41,7 @@ class OwnRuns:
 
     @property
     def model(self) -> mstmm.Model:
-        """The one that every scene has."""
+        """Model on the looped engine."""
         return self.models[LOOPED]
 
 
@@ -102,7 +102,7 @@ def simulate_call(own: OwnRuns, case: Case, setting: Setting) -> Callable[[], ob
 
 
 def shortest_call(runs_of_case: OwnRuns, case: Case) -> float:
-    """CPU s of a call of `simulate` over next to no time: what every call costs at least."""
+    """CPU time of a very short `simulate`, the minimum cost of a call, s."""
     model = runs_of_case.models.get(FUSED, runs_of_case.model)
     t_end = 1e-6 * case.t_end
     return min(
@@ -120,4 +120,4 @@ def _warm_up(model: mstmm.Model, t_end: float) -> None:
 
 
 def _ignore_message(_: str) -> None:
-    """Nobody listens."""
+    """Ignore progress messages."""

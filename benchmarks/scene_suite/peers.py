@@ -1,9 +1,9 @@
-"""Peers of a case: curves of settings from loose to tight, each run giving the watched end's place.
+"""Other programs: curves of settings from loose to tight, whose runs return the end position.
 
 SciPy's and SUNDIALS' methods get mstmm's compiled equations and their exact Jacobian (as in
 `benchmarks.stiff`).  Pinocchio's accelerations are integrated by DOP853 in C, as are those of an
-algorithm written with CasADi; MuJoCo and Exudyn integrate by themselves.  One that is not
-installed, or has no such scene, is left out with a word.
+algorithm written with CasADi; MuJoCo and Exudyn use their own integrators.  Programs that
+are not installed or cannot model a scene are reported.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ from .cases import TREES
 Report = Callable[[str], None]
 
 TOLERANCES = tuple(10.0 ** (-k / 2) for k in range(4, 27))
-#: Steps a second where they are fixed, of methods of order 4 and 6.
+#: Fixed steps per second, of methods of order 4 and 6.
 FOURTH_ORDER_RATES, SIXTH_ORDER_RATES = (
     tuple(10 ** (k / 4) for k in range(*ends)) for ends in ((6, 18), (4, 15))
 )  # fmt: skip
-#: What tools are called, by their functions here.
+#: Names of programs.
 NAMES = {"casadi": "CasADi", "pinocchio": "Pinocchio", "mujoco": "MuJoCo", "exudyn": "Exudyn"}
 #: Most links of which straight-line C is compiled.
 _MAX_BAKED_LINKS = 30
@@ -38,7 +38,7 @@ _LOOPS = 2000
 
 
 def case_curves(model: mstmm.Model, case: Case, report: Report) -> list[Curve]:
-    """Everybody who can."""
+    """Curves of all programs."""
     curves = programs.radau_curves(model, case) + dop853_curves(model, case)
     curves += programs.cvode_curves(model, case, report) + programs.exudyn_curves(case, report)
     if case.name not in TREES:
@@ -54,7 +54,7 @@ def case_curves(model: mstmm.Model, case: Case, report: Report) -> list[Curve]:
 
 
 def _missing_reason(case: Case) -> str:
-    """Why tools for rigid trees do not run a scene, as far as nothing was said yet."""
+    """Reason why programs for rigid trees cannot model a scene."""
     if "beam" in case.scene():
         return (
             "Pinocchio, MuJoCo, Exudyn: no beams with such shapes (Exudyn's cables are another "
@@ -62,7 +62,7 @@ def _missing_reason(case: Case) -> str:
         )
     if case.bushings is not None:
         return "Pinocchio, MuJoCo: no bushings in a plane"
-    return "Pinocchio, MuJoCo, Exudyn: no hinges of springs in six directions that act as ours do"
+    return "Pinocchio, MuJoCo, Exudyn: no equivalent hinges with springs in six directions"
 
 
 def has_fixed_steps(curve: Curve) -> bool:
@@ -88,7 +88,7 @@ def dop853_curves(model: mstmm.Model, case: Case) -> list[Curve]:
     return [Curve("SciPy DOP853", "explicit", [(t, partial(run, t)) for t in TOLERANCES])]
 
 
-# --- with accelerations, or all, of their own -----------------------------------------------------
+# --- own accelerations or integrators -----------------------------------------------------------
 
 
 def pinocchio_curves(model: mstmm.Model, case: Case, tree: Tree) -> list[Curve]:
@@ -117,8 +117,8 @@ def _dop853_curve(
     tool: str, builds: dict[str, Subject], model: mstmm.Model, case: Case,
     convert_q: Callable[[np.ndarray], np.ndarray],
 ) -> Curve:  # fmt: skip
-    """Accelerations of a tool, of several builds the fastest, inside DOP853 in C; `back` gives our
-    coordinates from its own."""
+    """Accelerations of a tool, fastest build, inside DOP853 in C; `convert_q` returns mstmm's
+    coordinates."""
     from ..common import dop853 as native
 
     name = min(builds, key=lambda k: min(builds[k].time(True, _LOOPS) for _ in range(3)))

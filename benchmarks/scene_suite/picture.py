@@ -1,4 +1,4 @@
-"""The picture of the standing charts: CPU time against achieved error, a panel for each scene."""
+"""Picture of the cost charts: CPU time over achieved error, a panel per scene."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ LINE_STYLES: dict[str, dict[str, Any]] = {
     "MuJoCo": style.LINE_STYLES["MuJoCo"],
     "Exudyn": style.LINE_STYLES["Exudyn"],
 }
-#: Of mstmm's single methods, behind its front.
+#: Line style of single methods of mstmm.
 _BACKGROUND: dict[str, Any] = {"color": "#c1121f", "lw": 0.7, "alpha": 0.3, "zorder": 1}
 #: Largest and smallest error that is shown, m.
 ERRORS = (1e-1, 1e-10)
@@ -96,7 +96,7 @@ def _panel(axes: Any, result: dict[str, Any]) -> None:
 
 
 def _summary_text(recommended: dict[str, Any]) -> str:
-    """mstmm's method for an error, and how it stands beside the best peer."""
+    """mstmm's method for an error, and its ratio to the best other program."""
     own_point = recommended["tools"][OWN]
     if "missed" in own_point:
         return "not met by mstmm"

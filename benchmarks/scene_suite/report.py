@@ -1,4 +1,4 @@
-"""The standing charts as a page: what to take for two errors, beside the best peer."""
+"""Page of the cost charts: recommended settings for two errors."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from .comparison import OWN
 
 
 def setting_text(point: dict[str, Any]) -> str:
-    """Method or tool, manner and setting of a point."""
+    """Method or program, variant and setting of a point."""
     value = (
         f"step {point['value']:.2g} s" if point["has_fixed_steps"] else f"rtol {point['value']:.0e}"
     )
@@ -60,7 +60,7 @@ def page(record: dict[str, Any], picture: str) -> str:
 
 
 def table(record: dict[str, Any]) -> str:
-    """What to take for every scene and error."""
+    """Recommended settings for every scene and error."""
     lines = [
         "| scene | error | mstmm | CPU ms | best peer | CPU ms | mstmm / peer |", "|---" * 7 + "|",
     ]  # fmt: skip
@@ -70,7 +70,7 @@ def table(record: dict[str, Any]) -> str:
 
 
 def scene(result: dict[str, Any]) -> str:
-    """What was run, and who could not."""
+    """Scene, programs, and reasons of missing ones."""
     tools = ", ".join(tool for tool in result["fronts"] if tool != OWN) or "none"
     return (
         f"- **{result['case']}**: {result['title']}, {result['t_end_s']:g} s, error of "
@@ -99,7 +99,7 @@ def cell(point: dict[str, Any]) -> list[str]:
 
 
 def all_programs(result: dict[str, Any]) -> str:
-    """CPU ms of every tool for the errors that are asked."""
+    """CPU ms of all programs for all target errors."""
     targets = list(result["recommended"])
     lines = [
         f"**{result['case']}**", "",

@@ -34,7 +34,7 @@ HALF, MASS, INERTIA, GRAVITY = 0.5, 1.0, 1 / 12, 9.81  # m, kg, kg m2, m/s2
 @dataclass(frozen=True)
 class Variant:
     """Variant of the method: `radius` of the damping at infinity; `newton` is "full", "modified" (a
-    new Jacobian when convergence is slow) or "once a step"; its tolerance, relative and absolute."""
+    new Jacobian when convergence is slow) or "once a step"; tolerance, relative and absolute."""
 
     radius: float
     newton: str
