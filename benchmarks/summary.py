@@ -1,19 +1,23 @@
-"""Targets against what was measured, and the picture of the project's front page.
+"""Targets compared with measurements, and the picture that shows them.
 
-    python benchmarks/summary.py [--run]
+    python benchmarks/summary.py [--run [FOLDER ...]]
 
-Reads result.json of every folder; with --run it takes all figures first, one benchmark after the
-other.  Writes benchmarks/summary.md and docs/images/speed.png.
+Reads result.json of all folders.  With --run it first measures, one benchmark after the other.
+Writes benchmarks/summary.md, docs/images/speed.png and the tables of
+docs/benchmarks/performance.md.
 """
 
 from __future__ import annotations
 
 import argparse
+import datetime
 import importlib.util
 import json
+import os
 import statistics
 import subprocess
 import sys
+import time
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -21,75 +25,86 @@ from typing import Any
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 
+import performance_tables  # noqa: E402
 from common import measure  # noqa: E402
 
-FOLDERS = (
-    "forward_dynamics", "batch_throughput", "work_precision", "startup", "long_chains", "flexible",
-    "loops",
-)  # fmt: skip
-Row = tuple[str, str, float, float, bool]  # what, where, measured, target, smaller is better
+STIFF_CASES = ("a10-1e8", "a50-1e8", "f", "d-half", "d-quarter")  # in the performance page
+#: Folder -> arguments of Python that measure it; all of one run take about an hour on one core.
+COMMANDS = {folder: (str(HERE / folder / "run.py"),) for folder in (
+    "forward_dynamics", "robots", "work_precision", "flexible", "long_chains", "loops", "startup",
+    "batch_throughput",
+)}  # fmt: skip
+STIFF_METHODS = "dop853,auto,rodas4p2,rodas5p,rodas4,ros34pw2,genalpha"
+STIFF_OPTIONS = ("--methods", STIFF_METHODS, "--rounds", "2", "--limit", "2", "--budget", "0.5")
+COMMANDS["stiff"] = ("-m", "benchmarks.stiff", *STIFF_CASES, *STIFF_OPTIONS)
+#: Folders with targets in summary.md.
+FOLDERS = tuple(folder for folder in COMMANDS if folder not in ("robots", "stiff"))
+Row = tuple[str, str, float, float, bool]  # quantity, scene, measured, target, smaller is better
 
 
-def module(folder: str) -> ModuleType:
+def load_run_module(folder: str) -> ModuleType:
     """run.py of a folder."""
     sys.path.insert(0, str(HERE / folder))
     spec = importlib.util.spec_from_file_location(f"{folder}_run", HERE / folder / "run.py")
     assert spec is not None and spec.loader is not None
-    found = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(found)
+    loaded = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(loaded)
     sys.path.remove(str(HERE / folder))
-    for name in ("picture", "contestants"):
+    for name in ("picture", "programs"):
         sys.modules.pop(name, None)
-    return found
+    return loaded
 
 
-def record(folder: str) -> dict[str, Any]:
-    """What a benchmark left."""
+def load_record(folder: str) -> dict[str, Any]:
+    """Stored record of a benchmark."""
     return dict(json.loads((HERE / folder / "result.json").read_text()))
 
 
-def forward() -> list[Row]:
+def forward_dynamics_rows() -> list[Row]:
     """Fused against CasADi and Pinocchio; looped against Pinocchio and itself."""
-    run = module("forward_dynamics")
-    results = record("forward_dynamics")["results"]
-    best = {(r["kind"], r["bodies"]): run.best(r) for r in results}
+    run = load_run_module("forward_dynamics")
+    results = load_record("forward_dynamics")["results"]
+    times_by_scene = {(r["kind"], r["bodies"]): run.best_times(r) for r in results}
     ratios = {
-        key: found["mstmm fused"] / found["CasADi C"]
-        for key, found in best.items()
-        if {"mstmm fused", "CasADi C"} <= found.keys()
+        key: times["mstmm fused"] / times["CasADi C"]
+        for key, times in times_by_scene.items()
+        if {"mstmm fused", "CasADi C"} <= times.keys()
     }
-    asked = {k: v for k, v in ratios.items() if k[1] in (3, 7, 24) or k[0] in ("puma", "humanoid")}
-    worst = max(asked, key=lambda k: asked[k])
-    hundred, seven = best["pins", 100], best["pins", 7]
-    own = {n: best["pins", n]["mstmm looped"] / n for n in (1000, 100_000)}
-    fresh = {
-        r["bodies"]: r["evaluation_ms"] / r["bodies"] for r in record("long_chains")["results"]
+    compared = {
+        k: v for k, v in ratios.items() if k[1] in (3, 7, 24) or k[0] in ("puma", "humanoid")
+    }
+    worst = max(compared, key=lambda k: compared[k])
+    times_100, times_7 = times_by_scene["pins", 100], times_by_scene["pins", 7]
+    per_body = {n: times_by_scene["pins", n]["mstmm looped"] / n for n in (1000, 100_000)}
+    separate_process = {
+        r["bodies"]: r["evaluation_ms"] / r["bodies"] for r in load_record("long_chains")["results"]
         if r["tool"] == "mstmm" and r["kind"] == "pins"
     }  # fmt: skip
     errors = [r["error"]["mstmm looped"] for r in results if r["error"]]
     return [
-        ("fused / CasADi C, worst", f"{worst[0]} {worst[1]}", asked[worst], 1.0, True),
+        ("fused / CasADi C, worst", f"{worst[0]} {worst[1]}", compared[worst], 1.0, True),
         ("fused / CasADi C, geometric mean", f"{len(ratios)} scenes",
          measure.geometric_mean(list(ratios.values())), 0.7, True),
-        ("fused / Pinocchio C++", "pins 7", seven["mstmm fused"] / seven["Pinocchio"], 0.2, True),
+        ("fused / Pinocchio C++", "pins 7", times_7["mstmm fused"] / times_7["Pinocchio"], 0.2,
+        True),
         ("looped / Pinocchio C++", "pins 100",
-         hundred["mstmm looped"] / hundred["Pinocchio"], 0.4, True),
+         times_100["mstmm looped"] / times_100["Pinocchio"], 0.4, True),
         ("looped per body, 1e5 / 1e3", "pins, each in a fresh process",
-         fresh[100_000] / fresh[1000], 1.5, True),
+         separate_process[100_000] / separate_process[1000], 1.5, True),
         ("the same", "pins, in a process where peers ran before",
-         own[100_000] / own[1000], 1.5, True),
+         per_body[100_000] / per_body[1000], 1.5, True),
         ("looped, relative error", "largest up to 100 bodies", max(errors), 1e-13, True),
     ]  # fmt: skip
 
 
-def batches() -> list[Row]:
-    """What lanes gain over one state at a time, on one core."""
-    run = module("batch_throughput")
+def batch_rows() -> list[Row]:
+    """Speed-up of vector lanes over single states on one core."""
+    run = load_run_module("batch_throughput")
     gains = {}
-    for result in record("batch_throughput")["results"]:
-        found = run.best(result, "one_core_cpu_ns")
+    for result in load_record("batch_throughput")["results"]:
+        times = run.best_times(result, "one_core_cpu_ns")
         name = f"{result['kind']} {result['bodies']}"
-        gains[name] = found["mstmm one by one"] / found["mstmm lanes"]
+        gains[name] = times["mstmm one by one"] / times["mstmm lanes"]
     worst = min(gains, key=lambda k: gains[k])
     mean = measure.geometric_mean(list(gains.values()))
     return [
@@ -98,114 +113,119 @@ def batches() -> list[Row]:
     ]
 
 
-def precision() -> list[Row]:
+def work_precision_rows() -> list[Row]:
     """10 s to 1e-9 against CasADi with CVODES."""
-    run = module("work_precision")
+    run = load_run_module("work_precision")
     rows: list[Row] = []
-    for result in record("work_precision")["results"]:
-        own, other = (run.cheapest(result["curves"][k]) for k in ("mstmm", "CasADi + CVODES"))
-        if own and other:
+    for result in load_record("work_precision")["results"]:
+        per_body, other = (run.cheapest(result["curves"][k]) for k in ("mstmm", "CasADi + CVODES"))
+        if per_body and other:
             rows.append(("10 s to 1e-9 rad / CasADi + CVODES", result["scene"],
-                         own[1] / other[1], 0.15, True))  # fmt: skip
+                         per_body[1] / other[1], 0.15, True))  # fmt: skip
     return rows
 
 
-def starts() -> list[Row]:
+def startup_rows() -> list[Row]:
     """Imports and first results."""
-    run = module("startup")
-    found = run.ratios(record("startup")["results"])
-    return [(name, "7 pins", value, run.TARGETS[name], True) for name, value in found.items()]
+    run = load_run_module("startup")
+    ratios = run.ratios(load_record("startup")["results"])
+    return [(name, "7 pins", value, run.TARGETS[name], True) for name, value in ratios.items()]
 
 
-def flexible() -> list[Row]:
-    """Runs of flexible bodies against Exudyn's ANCF cable, both as accurate as asked."""
-    run = module("flexible")
-    found = record("flexible")
+def flexible_rows() -> list[Row]:
+    """Runs of flexible bodies compared with Exudyn's ANCF cable at the same error."""
+    run = load_run_module("flexible")
+    stored = load_record("flexible")
     rows: list[Row] = []
-    for result in found["results"]:
+    for result in stored["results"]:
         value = run.ratio(result)
         if value is not None:
             rows.append(
-                ("flexible / Exudyn ANCF", result["scene"], value, found["asked_ratio"], True)
+                ("flexible / Exudyn ANCF", result["scene"], value, stored["target_ratio"], True)
             )
     return rows
 
 
-def loops() -> list[Row]:
-    """Closed loops against those who close them by constraints."""
-    found = module("loops").ratios(record("loops")["results"])
-    return [(f"closed loops, {what}", where, value, asked, True)
-            for what, where, value, asked in found]  # fmt: skip
+def loop_rows() -> list[Row]:
+    """Closed loops compared with programs that use constraints."""
+    loaded = load_run_module("loops").ratios(load_record("loops")["results"])
+    return [(f"closed loops, {what}", where, value, compared, True)
+            for what, where, value, compared in loaded]  # fmt: skip
 
 
 def table(rows: list[Row]) -> str:
     """Markdown."""
-    lines = ["| target | where | measured | asked | met |", "|---" * 5 + "|"]
-    for what, where, value, target, smaller in rows:
-        met = value <= target if smaller else value >= target
-        sign = "≤" if smaller else "≥"
+    lines = ["| quantity | scene | measured | target | met |", "|---" * 5 + "|"]
+    for what, where, value, target, is_upper_bound in rows:
+        met = value <= target if is_upper_bound else value >= target
+        sign = "≤" if is_upper_bound else "≥"
         lines.append(
             f"| {what} | {where} | {value:.3g} | {sign} {target:g} | {'yes' if met else '**no**'} |"
         )
     return "\n".join(lines)
 
 
-def machines() -> str:
-    """On what the figures were taken, and when; the median of the loads of each."""
-    loads: dict[str, list[tuple[str, float]]] = {}
-    for folder in FOLDERS:
-        at = record(folder)["machine"]
-        words = (
-            f"{at['date']}, {at['cores']}-core {at['processor']} ({at['vectors']}), "
-            f"gcc {at['gcc']}, Python {at['python']}"
-        )
-        loads.setdefault(words, []).append((folder, float(at["load"])))
-    return "\n".join(
-        f"- {', '.join(folder for folder, _ in found)}: {words}, "
-        f"load {statistics.median([load for _, load in found]):.1f}."
-        for words, found in loads.items()
+def machine_text(machine: dict[str, Any]) -> str:
+    """Date, processor and programs of a measurement."""
+    return "{date}, {cores}-core {processor} ({vectors}), gcc {gcc}, Python {python}".format(
+        **machine
     )
 
 
-def picture(path: Path) -> None:
-    """Length, ratio to CasADi, and speed against accuracy, side by side."""
+def machine_lines() -> str:
+    """Machines and dates of the benchmarks, with the median of the loads."""
+    loads: dict[str, list[tuple[str, float]]] = {}
+    for folder in FOLDERS:
+        machine = load_record(folder)["machine"]
+        loads.setdefault(machine_text(machine), []).append((folder, float(machine["load"])))
+    return "\n".join(
+        f"- {', '.join(folder for folder, _ in folders)}: {line}, "
+        f"load {statistics.median([load for _, load in folders]):.1f}."
+        for line, folders in loads.items()
+    )
+
+
+def draw_summary(path: Path) -> None:
+    """Time over length, ratio to CasADi, and time over error."""
     import matplotlib.pyplot as plt
     from common import style
 
-    forward_run, precision_run = module("forward_dynamics"), module("work_precision")
-    results = record("forward_dynamics")
+    forward_run = load_run_module("forward_dynamics")
+    results = load_record("forward_dynamics")
     figure, panels = plt.subplots(1, 3, figsize=(11.5, 4.1))
     figure.subplots_adjust(left=0.055, right=0.99, top=0.91, bottom=0.19, wspace=0.24)
     for name in ("mstmm fused", "mstmm looped", "CasADi C", "Pinocchio", "MuJoCo", "Drake"):
-        found = [(r["bodies"], forward_run.best(r).get(name)) for r in results["results"]
-                 if r["kind"] == "pins"]  # fmt: skip
-        points = [(n, value / n) for n, value in found if value]
-        panels[0].plot(*zip(*points, strict=True), **style.look(name))
+        times = {r["bodies"]: forward_run.best_times(r).get(name) for r in results["results"]
+                 if r["kind"] == "pins"}  # fmt: skip
+        points = [(n, value / n) for n, value in times.items() if value]
+        panels[0].plot(*zip(*points, strict=True), **style.line_style(name))
     panels[0].set(xscale="log", yscale="log", xlabel="bodies", ylabel="CPU ns per body",
                   title="Accelerations of a chain of pins")  # fmt: skip
     panels[0].legend(fontsize=7.5, labelspacing=0.2)
     _ratios(panels[1], results["results"], forward_run)
-    data = record("work_precision")
-    _precision(panels[2], data, precision_run)
-    style.footer(
+    data = load_record("work_precision")
+    _precision(panels[2], data)
+    style.add_footer(
         figure, results,
-        "CPU times in one run, inputs waiting on outputs, each tool in its best form.",
+        "CPU times of one run, latency-chained, each program in its best form.",
     )  # fmt: skip
-    style.save(figure, path)
+    style.save_figure(figure, path)
 
 
 def _ratios(axes: Any, results: list[dict[str, Any]], run: ModuleType) -> None:
     from common import style
 
-    shown = [(r, run.best(r)) for r in results]
-    shown = [(r, b) for r, b in shown if {"mstmm fused", "CasADi C"} <= b.keys()]
-    looks = {"pins": "o", "balls": "s", "planar": "^", "puma": "D", "humanoid": "P"}
-    for kind, marker in looks.items():
+    compared = [(r, run.best_times(r)) for r in results]
+    compared = [(r, b) for r, b in compared if {"mstmm fused", "CasADi C"} <= b.keys()]
+    markers = {"pins": "o", "balls": "s", "planar": "^", "puma": "D", "humanoid": "P"}
+    for kind, marker in markers.items():
         points = [
-            (r["bodies"], b["mstmm fused"] / b["CasADi C"]) for r, b in shown if r["kind"] == kind
+            (r["bodies"], b["mstmm fused"] / b["CasADi C"])
+            for r, b in compared
+            if r["kind"] == kind
         ]
         if points:
-            colour = style.LOOKS["mstmm fused"]["color"]
+            colour = style.LINE_STYLES["mstmm fused"]["color"]
             axes.plot(*zip(*points, strict=True), marker=marker, label=kind, color=colour,
                       lw=1, mfc="white" if kind != "pins" else colour)  # fmt: skip
     axes.axhline(1.0, color="black", lw=0.8)
@@ -217,19 +237,19 @@ def _ratios(axes: Any, results: list[dict[str, Any]], run: ModuleType) -> None:
     axes.legend(fontsize=7.5, loc="lower right", ncol=2)
 
 
-def _precision(axes: Any, data: dict[str, Any], run: ModuleType) -> None:
+def _precision(axes: Any, data: dict[str, Any]) -> None:
     from common import style
 
     picture_of = HERE / "work_precision" / "picture.py"
     spec = importlib.util.spec_from_file_location("work_precision_picture", picture_of)
     assert spec is not None and spec.loader is not None
-    drawn = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(drawn)
+    picture_module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(picture_module)
     for name, curve in data["results"][0]["curves"].items():
-        points = drawn.frontier(drawn.points_of(curve))
+        points = style.pareto_front(picture_module.curve_points(curve))
         if points:
-            looks = {**drawn.LOOKS.get(name, style.LOOKS.get(name, {})), "label": name}
-            axes.plot(*zip(*points, strict=True), **looks)
+            look = picture_module.LINE_STYLES.get(name, style.LINE_STYLES.get(name, {}))
+            axes.plot(*zip(*points, strict=True), label=name, **look)
     axes.set(xscale="log", yscale="log", xlabel="achieved error, rad", ylabel="CPU ms",
              title="10 s of a three-pin arm")  # fmt: skip
     axes.set(xlim=(1e-2, 1e-13), ylim=(0.04, 3e4))
@@ -237,19 +257,27 @@ def _precision(axes: Any, data: dict[str, Any], run: ModuleType) -> None:
 
 
 def main() -> None:
-    """Everything that is asked for."""
+    """Measure if requested; write tables and picture."""
     parser = argparse.ArgumentParser(description=str(__doc__).splitlines()[0])
-    parser.add_argument("--run", action="store_true", help="take all figures first")
+    parser.add_argument(
+        "--run", nargs="*", choices=list(COMMANDS), help="measure; all unless named"
+    )
     options = parser.parse_args()
-    if options.run:
-        for folder in FOLDERS:
-            subprocess.run([sys.executable, str(HERE / folder / "run.py")], check=True)
-    rows = forward() + batches() + precision() + starts() + flexible() + loops()
-    text = table(rows)
-    text += f"\n\n{machines()}\n"
+    if options.run is not None:
+        environment = os.environ | {
+            "BENCHMARK_RUN": datetime.datetime.now().isoformat("T", "minutes")
+        }
+        for folder in options.run or COMMANDS:
+            start_time = time.monotonic()
+            command = [sys.executable, *COMMANDS[folder]]
+            subprocess.run(command, check=True, cwd=HERE.parent, env=environment)
+            print(f"{folder}: {(time.monotonic() - start_time) / 60:.1f} min", flush=True)
+    rows = forward_dynamics_rows() + batch_rows() + work_precision_rows() + startup_rows()
+    text = f"{table(rows + flexible_rows() + loop_rows())}\n\n{machine_lines()}\n"
     print(text)
     (HERE / "summary.md").write_text(text)
-    picture(HERE.parent / "docs" / "images" / "speed.png")
+    draw_summary(HERE.parent / "docs" / "images" / "speed.png")
+    performance_tables.write_page(load_run_module)
 
 
 if __name__ == "__main__":

@@ -1,10 +1,9 @@
-"""Whether an advised model keeps what was asked, and what it costs beside the cheapest one.
+"""Error and cost of advised models, compared with the cheapest model.
 
     python -m benchmarks.advice [--tuning] [--each N] [--seed N] [--rounds N] [--jobs N]
 
-Four scenes of a hub with a beam, and scenes drawn afresh (`--tuning`: with the seed on which
-the rules were set).  Processor time of whole warm calls, the least of alternating rounds, on the
-looped engine.
+Four scenes of a hub with a beam, and random scenes (`--tuning`: with the seed used to set the
+rules).  Minimum CPU time of whole warm calls in alternating rounds, looped engine.
 """
 
 from __future__ import annotations
@@ -17,20 +16,20 @@ from pathlib import Path
 from typing import Any
 
 from ..common import measure
-from ..error_control.scenes import draw
+from ..error_control.scenes import draw_scenes
 from . import scenes, trials
 from .report import table
 
 HERE = Path(__file__).resolve().parent
 
-#: Seeds of the scenes on which the rules were set, and of those on which they are judged.
-_TUNING, _JUDGED = 7, 2029
+#: Seeds of the scenes used to set and to test the rules.
+_TUNING_SEED, _TEST_SEED = 7, 2029
 
 
 def main() -> None:
     """Run all; print, and write result.json and result.md, after every scene."""
     parser = ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--tuning", action="store_true", help="scenes on which rules were set")
+    parser.add_argument("--tuning", action="store_true", help="scenes used to set the rules")
     parser.add_argument("--each", type=int, default=4, help="scenes of each family")
     parser.add_argument("--seed", type=int, default=None)
     parser.add_argument("--rounds", type=int, default=7, help="alternating rounds of times")
@@ -39,23 +38,29 @@ def main() -> None:
     options = parser.parse_args()
     seed = options.seed
     if seed is None:
-        seed = _TUNING if options.tuning else _JUDGED
-    drawn = draw(scenes.FAMILIES, options.each, seed)
-    tasks = [(name, one, options.rounds) for name, one in {**scenes.four(), **drawn}.items()]
+        seed = _TUNING_SEED if options.tuning else _TEST_SEED
+    random_scenes = draw_scenes(scenes.FAMILIES, options.each, seed)
+    tasks = [
+        (name, trial, options.rounds)
+        for name, trial in {**scenes.hub_scenes(), **random_scenes}.items()
+    ]
     outcomes: list[trials.Outcome] = []
-    without: dict[str, float] = {}
+    scenes_without_reference: dict[str, float] = {}
     data: dict[str, Any] = {
-        "machine": measure.machine(), "set": "tuning" if options.tuning else "judged",
+        "machine": measure.machine(), "set": "tuning" if options.tuning else "test",
         "each": options.each, "seed": seed, "rounds": options.rounds, "jobs": options.jobs,
-        "scenes_drawn": len(drawn),
+        "scenes_drawn": len(random_scenes),
     }  # fmt: skip
     with get_context("spawn").Pool(options.jobs) as pool:
-        for name, found, floor in pool.imap_unordered(trials.tried, tasks):
-            if not found:
-                without[name] = floor
-            outcomes += found
-            print(*(one.line() for one in found), sep="\n", flush=True)
-            data |= {"without_reference": without, "outcomes": [asdict(x) for x in outcomes]}
+        for name, new_outcomes, floor in pool.imap_unordered(trials.run_scene, tasks):
+            if not new_outcomes:
+                scenes_without_reference[name] = floor
+            outcomes += new_outcomes
+            print(*(trial.text() for trial in new_outcomes), sep="\n", flush=True)
+            data |= {
+                "without_reference": scenes_without_reference,
+                "outcomes": [asdict(trial) for trial in outcomes],
+            }
             text = json.dumps(data, indent=1) + "\n"
             (options.out / "result.json").write_text(text, encoding="utf-8")
             (options.out / "result.md").write_text(table(outcomes, data), encoding="utf-8")

@@ -1,5 +1,5 @@
-"""The cheapest model that meets an error, found by trying all: levels and shapes of every body,
-each by several methods over their tolerances."""
+"""Exhaustive search of the cheapest model that meets an error: levels and shape functions of all
+bodies, several methods, all tolerances."""
 
 from __future__ import annotations
 
@@ -29,28 +29,32 @@ from mstmm.runtime.chart.planar_model import planar_level
 from mstmm.runtime.result.flexible.modal_energy import modal_frequencies
 from mstmm.runtime.result.one_way.result import OneWayResult
 
-#: Samples at which errors are looked at: others than an advice looks at.
+#: Number of times at which errors are compared, different from those of an advice.
 SAMPLES = 241
 
 #: Tolerances of runs, with a hundredth of each as the absolute one; of those that show what a model
 #: errs by itself, and of the two of the reference.
 TOLERANCES = tuple(10.0**-k for k in range(2, 9))
-ATOL_PART, _OWN, _TRUTH = 0.01, 1e-7, (("rodas5p", 1e-9), ("dop853", 1e-10), ("auto", 1e-9))
+ATOL_PART, _MODEL_ERROR_RTOL, _REFERENCE_METHODS = (
+    0.01,
+    1e-7,
+    (("rodas5p", 1e-9), ("dop853", 1e-10), ("auto", 1e-9)),
+)
 
-#: Parts of a beam in the truth of one that is split.
+#: Parts of a split beam in the reference.
 _PARTS = 16
 
 #: Steps after which a run is given up; models that are tried of one scene.
-_MOST_STEPS, _MOST_MODELS = 200_000, 81
+_MAX_STEPS, _MAX_MODELS = 200_000, 81
 
 #: A method is followed no further where it costs so many times the cheapest run that errs by less,
 #: nor a model where its own run costs so many times that of the cheapest one.
-_HOPELESS, _SLOW = 6.0, 12.0
+_MAX_COST_RATIO, _MAX_MODEL_COST_RATIO = 6.0, 12.0
 
 
 @dataclass(frozen=True)
-class Truth:
-    """What the richest model does, and how far two methods are apart."""
+class Reference:
+    """Solution of the richest model, and the difference of two methods."""
 
     numbers: np.ndarray
     error: float
@@ -59,8 +63,8 @@ class Truth:
 
 
 @dataclass(frozen=True)
-class Single:
-    """A run of a model: its error and processor time of the call, s."""
+class Run:
+    """A run of a model: its error and CPU time, s."""
 
     model: str
     method: str
@@ -72,73 +76,80 @@ class Single:
         return f"{self.model}, {self.method} {self.rtol:.0e}"
 
 
-def timed(
+def run_timed(
     model: mstmm.Model, t_end: float, method: str, **options: Any
 ) -> tuple[mstmm.Result, float] | None:
-    """A run and the processor time of the call, with the elastic response where there is one; None
-    where it does not reach the end."""
+    """A run and its CPU time, with the elastic response if there is one; None if it fails."""
     times = np.linspace(0.0, t_end, SAMPLES)
-    limited = mstmm.methods.Method(method, max_steps=_MOST_STEPS)
-    begin = time.process_time()
+    method_settings = mstmm.methods.Method(method, max_steps=_MAX_STEPS)
+    start_time = time.process_time()
     try:
-        result = model.simulate(t_end, limited, output_times=times, **options)
+        result = model.simulate(t_end, method_settings, output_times=times, **options)
         if isinstance(result, OneWayResult) and result.success:
             _ = result.cost
     except mstmm.MstmmError:
         return None
-    spent = time.process_time() - begin
-    return (result, spent) if result.success else None
+    cpu_s = time.process_time() - start_time
+    return (result, cpu_s) if result.success else None
 
 
-def single(model: mstmm.Model, t_end: float, method: str, rtol: float) -> Any:
+def run_once(model: mstmm.Model, t_end: float, method: str, rtol: float) -> Any:
     """One run by a method at a tolerance."""
-    return timed(model, t_end, method=method, rtol=rtol, atol=ATOL_PART * rtol)
+    return run_timed(model, t_end, method=method, rtol=rtol, atol=ATOL_PART * rtol)
 
 
-def truth(scene: mstmm.Scene, t_end: float) -> Truth | None:
+def compute_reference(scene: mstmm.Scene, t_end: float) -> Reference | None:
     """The richest model by two methods that agree best; None where no two reach the end."""
-    top = model_levels(scene)[-1]
-    model = mstmm.compile(top.scene, engine="looped")
+    richest = model_levels(scene)[-1]
+    model = mstmm.compile(richest.scene, engine="looped")
     measure = Renaming(PositionMeasure(model, model.simulate(0.0)))
-    found = _agreed(model, measure, t_end)
-    if found is None:
+    agreement = _best_agreement(model, measure, t_end)
+    if agreement is None:
         return None
-    error, numbers, q = found
-    flat = planar_level(Variant("richest", top.scene), model, q)
-    return Truth(numbers, error, measure, top.scene if flat is None else flat.scene)
+    error, numbers, q = agreement
+    planar = planar_level(Variant("richest", richest.scene), model, q)
+    return Reference(numbers, error, measure, richest.scene if planar is None else planar.scene)
 
 
-def truth_in_parts(known: Truth, wholes: set[str], t_end: float) -> Truth | None:
+def reference_in_parts(truth: Reference, beam_names: set[str], t_end: float) -> Reference | None:
     """The same with beams that one frame cannot follow in sixteen welded parts each."""
-    parts = split_beams(_divisible(known.base, wholes), wholes, _PARTS)
-    model = mstmm.compile(parts.scene, engine="looped")
-    known.measure.register(model, parts.names)
-    found = _agreed(model, known.measure, t_end)
-    return None if found is None else Truth(found[1], found[0], known.measure, known.base)
+    split = split_beams(_with_splittable_beams(truth.base, beam_names), beam_names, _PARTS)
+    model = mstmm.compile(split.scene, engine="looped")
+    truth.measure.register(model, split.names)
+    agreement = _best_agreement(model, truth.measure, t_end)
+    return (
+        None
+        if agreement is None
+        else Reference(agreement[1], agreement[0], truth.measure, truth.base)
+    )
 
 
-def _divisible(scene: mstmm.Scene, wholes: set[str]) -> mstmm.Scene:
+def _with_splittable_beams(scene: mstmm.Scene, beam_names: set[str]) -> mstmm.Scene:
     """The scene whose beams have nothing that belongs to shapes of the whole."""
     bodies = mstmm.compile(scene, engine="looped").flexible_bodies
     beams = (
         make_splittable(beam, float(modal_frequencies(bodies[beam.name])[0]))[0]
-        if beam.name in wholes
+        if beam.name in beam_names
         else beam
         for beam in scene.beam
     )
     return with_tables(scene, beam=tuple(beams))
 
 
-def _agreed(
+def _best_agreement(
     model: mstmm.Model, measure: Renaming, t_end: float
 ) -> tuple[float, np.ndarray, np.ndarray] | None:
-    """How far the two runs are apart that agree best, and numbers and coordinates of one."""
-    runs = [found[0] for name, rtol in _TRUTH if (found := single(model, t_end, name, rtol))]
+    """Difference of the two runs that agree best, with numbers and coordinates of one."""
+    runs = [
+        run_and_time[0]
+        for name, rtol in _REFERENCE_METHODS
+        if (run_and_time := run_once(model, t_end, name, rtol))
+    ]
     numbers = [measure.read(run) for run in runs]
     pairs = [
-        (float(measure.distance(a, b).max()), i)
-        for i, a in enumerate(numbers)
-        for b in numbers[i + 1 :]
+        (float(measure.distance(first, second).max()), i)
+        for i, first in enumerate(numbers)
+        for second in numbers[i + 1 :]
     ]
     if not pairs:
         return None
@@ -146,83 +157,98 @@ def _agreed(
     return error, numbers[i], runs[i].q
 
 
-def models(base: mstmm.Scene) -> Iterator[tuple[str, mstmm.Scene]]:
-    """Every level and number of shapes of every body; of many bodies all alike."""
+def candidate_models(base: mstmm.Scene) -> Iterator[tuple[str, mstmm.Scene]]:
+    """Scenes with every level and number of shapes per body; for many bodies all alike."""
     bodies = Bodies(base)
-    each = {name: list(_choices(richest)) for name, richest in bodies.richest.items()}
-    if np.prod([len(one) for one in each.values()]) <= _MOST_MODELS:
-        picked = [dict(zip(each, some, strict=True)) for some in product(*each.values())]
+    choices_of_bodies = {
+        name: list(_body_choices(richest)) for name, richest in bodies.richest.items()
+    }
+    if np.prod([len(choices) for choices in choices_of_bodies.values()]) <= _MAX_MODELS:
+        choices_of_models = [
+            dict(zip(choices_of_bodies, values, strict=True))
+            for values in product(*choices_of_bodies.values())
+        ]
     else:
-        most = max(len(one) for one in each.values())
-        picked = [{name: one[min(i, len(one) - 1)] for name, one in each.items()}
-                  for i in range(most)]  # fmt: skip
-        picked += [
-            {name: one[-1] if name != other else one[i] for name, one in each.items()}
-            for other in each for i in range(len(each[other]))
+        max_count = max(len(choices) for choices in choices_of_bodies.values())
+        choices_of_models = [{name: choices[min(i, len(choices) - 1)] for name,
+        choices in choices_of_bodies.items()}
+                  for i in range(max_count)]  # fmt: skip
+        choices_of_models += [
+            {name: choices[-1] if name != body else choices[i] for name,
+            choices in choices_of_bodies.items()}
+            for body in choices_of_bodies for i in range(len(choices_of_bodies[body]))
         ]  # fmt: skip
-    for choices in picked:
+    for choices in choices_of_models:
         yield "; ".join(f"{k}: {v}" for k, v in choices.items()), bodies.scene_of(choices)
 
 
-def _choices(richest: BodyModel) -> Iterator[BodyModel]:
+def _body_choices(richest: BodyModel) -> Iterator[BodyModel]:
     yield BodyModel(RIGID)
     yield BodyModel(ONE_WAY, richest.shapes)
     for n in range(1, max(count for _, count in richest.shapes) + 1):
-        kept = tuple((word, min(n, count)) for word, count in richest.shapes)
-        yield BodyModel(LINEAR, kept)
-        yield BodyModel(STIFFENED, kept)
+        shapes = tuple((direction, min(n, count)) for direction, count in richest.shapes)
+        yield BodyModel(LINEAR, shapes)
+        yield BodyModel(STIFFENED, shapes)
 
 
-def singles(known: Truth, t_end: float, loosest: float, tightest: float) -> list[Single]:
-    """Runs of every model that errs by less than `loosest` by itself, by every method, from loose
-    to tight."""
-    own: list[tuple[float, str, mstmm.Model, float]] = []
-    for name, scene in models(known.base):
+def single_runs(truth: Reference, t_end: float, max_error: float, min_error: float) -> list[Run]:
+    """Runs of all models with a model error below `max_error`, by all methods, loose to tight."""
+    model_runs: list[tuple[float, str, mstmm.Model, float]] = []
+    for name, scene in candidate_models(truth.base):
         try:
             model = mstmm.compile(scene, engine="looped")
         except mstmm.MstmmError:
             continue
-        found = single(model, t_end, "auto", _OWN)
-        if found is not None and (error := _error(known, found[0])) <= loosest:
-            own.append((found[1], name, model, error))
-    made: list[Single] = []
-    for cost, name, model, error in sorted(own, key=lambda one: one[0]):
-        rivals = [c for c, _, _, e in own if e <= error]
-        if cost <= _SLOW * min(rivals):
-            made += _curves(known, name, model, t_end, max(tightest, error), made)
-    return made
+        run = run_once(model, t_end, "auto", _MODEL_ERROR_RTOL)
+        if run is not None and (error := _error(truth, run[0])) <= max_error:
+            model_runs.append((run[1], name, model, error))
+    runs: list[Run] = []
+    for cost, name, model, error in sorted(model_runs, key=lambda run: run[0]):
+        cheaper = [c for c, _, _, e in model_runs if e <= error]
+        if cost <= _MAX_MODEL_COST_RATIO * min(cheaper):
+            runs += _curves(truth, name, model, t_end, max(min_error, error), runs)
+    return runs
 
 
 def _curves(
-    known: Truth, name: str, model: mstmm.Model, t_end: float, least: float, made: list[Single]
-) -> list[Single]:
-    found: list[Single] = []
+    truth: Reference,
+    name: str,
+    model: mstmm.Model,
+    t_end: float,
+    model_error: float,
+    runs_before: list[Run],
+) -> list[Run]:
+    runs: list[Run] = []
     for method in PROMISING:
         for rtol in TOLERANCES:
-            run = single(model, t_end, method, rtol)
+            run = run_once(model, t_end, method, rtol)
             if run is None:
                 break
-            error = _error(known, run[0])
-            found.append(Single(name, method, rtol, error, run[1]))
-            better = [x.cpu_s for x in (*made, *found) if x.error <= max(error, least)]
-            if error <= 1.1 * least or (better and run[1] > _HOPELESS * min(better)):
+            error = _error(truth, run[0])
+            runs.append(Run(name, method, rtol, error, run[1]))
+            better = [
+                other.cpu_s
+                for other in (*runs_before, *runs)
+                if other.error <= max(error, model_error)
+            ]
+            if error <= 1.1 * model_error or (better and run[1] > _MAX_COST_RATIO * min(better)):
                 break
-    return found
+    return runs
 
 
-def _error(known: Truth, result: mstmm.Result) -> float:
-    return float(known.measure.distance(known.measure.read(result), known.numbers).max())
+def _error(truth: Reference, result: mstmm.Result) -> float:
+    return float(truth.measure.distance(truth.measure.read(result), truth.numbers).max())
 
 
-def cheapest(made: list[Single], asked: float, sure: bool) -> Single | None:
-    """The cheapest run that errs by no more; `sure`: as do all tighter ones of its curve."""
-    good = [one for one in made if one.error <= asked]
-    if sure:
-        good = [
-            one for one in good
+def cheapest(runs: list[Run], target: float, all_tighter: bool) -> Run | None:
+    """Cheapest run that meets the target; `all_tighter`: all tighter ones of its curve too."""
+    accurate = [run for run in runs if run.error <= target]
+    if all_tighter:
+        accurate = [
+            run for run in accurate
             if all(
-                x.error <= asked for x in made
-                if (x.model, x.method) == (one.model, one.method) and x.rtol <= one.rtol
+                other.error <= target for other in runs
+                if (other.model, other.method) == (run.model, run.method) and other.rtol <= run.rtol
             )
         ]  # fmt: skip
-    return min(good, key=lambda one: one.cpu_s, default=None)
+    return min(accurate, key=lambda run: run.cpu_s, default=None)

@@ -1,4 +1,4 @@
-"""What is advised for one scene, beside the truth and the cheapest model found by trying all."""
+"""Advice for one scene, compared with a reference and with the cheapest model."""
 
 from __future__ import annotations
 
@@ -7,56 +7,55 @@ from dataclasses import dataclass
 
 import mstmm
 
-from ..error_control.scenes import Drawn
+from ..error_control.scenes import Sample
 from .exhaustive_search import (
-    Single,
-    Truth,
+    Reference,
+    Run,
+    candidate_models,
     cheapest,
-    models,
-    single,
-    singles,
-    timed,
-    truth,
-    truth_in_parts,
+    compute_reference,
+    reference_in_parts,
+    run_once,
+    run_timed,
+    single_runs,
 )
 
-#: Errors that are asked for, in parts of the scene's length.
-ASKED = (1e-2, 1e-3, 1e-4)
+#: Target errors relative to the length of the scene.
+TARGET_ERRORS = (1e-2, 1e-3, 1e-4)
 
-#: A reference that is off by more than this part of the smallest error asked for is none.
-_GOOD = 0.1
+#: Largest error of a reference relative to the smallest target.
+_MAX_REFERENCE_ERROR_RATIO = 0.1
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """One scene, one error asked for.
+    """One scene, one target error.
 
     Attributes:
-        scene, asked: which.
-        error: true error of the advised model with the advised setting, against the richest model;
-            where that is split, against sixteen parts, and no model of the ladder is its rival.
-        told: the error that the advice says.
-        cpu_s: of that run, the least of the rounds.
-        best, best_cpu_s: the cheapest sure run of any model, and its time from the same rounds;
-            None where there is none.
-        lucky_cpu_s: of the cheapest run of all, lucky hits included.
-        advised: choices and setting in words.
-        whole: models were compared over the whole run.
-        spent_s: of the clock, that the advice took.
-        saving: time of the scene as given over that of the advised one, as the advice says.
+        error: true error of the advised model and setting against the richest model; where beams
+            are split, against sixteen parts, without a cheapest model.
+        estimated_error: error reported by the advice.
+        cpu_s: minimum CPU time of that run.
+        cheapest_sure, cheapest_sure_cpu_s: cheapest run whose tighter settings meet the target
+            too, or None.
+        cheapest_cpu_s: time of the cheapest run, including accidentally accurate ones.
+        advised: choices and setting as text.
+        covers_whole_run: whether models were compared over the whole run.
+        advice_s: wall time of the advice.
+        saving: time of the given scene over that of the advised one, by the advice.
     """
 
     scene: str
-    asked: float
+    target: float
     error: float
-    told: float
+    estimated_error: float
     cpu_s: float
-    best: str | None
-    best_cpu_s: float | None
-    lucky_cpu_s: float | None
+    cheapest_sure: str | None
+    cheapest_sure_cpu_s: float | None
+    cheapest_cpu_s: float | None
     advised: str
-    whole: bool
-    spent_s: float
+    covers_whole_run: bool
+    advice_s: float
     saving: float | None
 
     @property
@@ -65,79 +64,90 @@ class Outcome:
         return self.scene.rstrip("0123456789")
 
     @property
-    def kept(self) -> bool:
-        """The true error is at most what was asked."""
-        return self.error <= self.asked
+    def is_met(self) -> bool:
+        """The true error is at most the target."""
+        return self.error <= self.target
 
     @property
     def ratio(self) -> float | None:
         """Time in that of the cheapest sure run."""
-        return None if self.best_cpu_s is None else self.cpu_s / self.best_cpu_s
+        return None if self.cheapest_sure_cpu_s is None else self.cpu_s / self.cheapest_sure_cpu_s
 
-    def cheap(self, times: float, lucky: bool = False) -> bool | None:
+    def is_within(self, factor: float, count_lucky: bool = False) -> bool | None:
         """Whether the time is at most so many times that of the cheapest; None without one."""
-        other = self.lucky_cpu_s if lucky else self.best_cpu_s
-        return None if other is None else self.cpu_s <= times * other
+        cheapest_s = self.cheapest_cpu_s if count_lucky else self.cheapest_sure_cpu_s
+        return None if cheapest_s is None else self.cpu_s <= factor * cheapest_s
 
-    def line(self) -> str:
-        """All of it in words."""
-        ratio = "" if self.ratio is None else f", {self.ratio:.2f} times {self.best}"
+    def text(self) -> str:
+        """One line of text."""
+        ratio = "" if self.ratio is None else f", {self.ratio:.2f} times {self.cheapest_sure}"
         return (
-            f"{self.scene}: asked {self.asked:.0e}, told {self.told:.1e}, true {self.error:.1e}; "
-            f"{self.advised}, {1e3 * self.cpu_s:.2f} ms{ratio}; took {self.spent_s:.1f} s"
+            f"{self.scene}: target {self.target:.0e}, estimate {self.estimated_error:.1e}, "
+            f"true {self.error:.1e}; "
+            f"{self.advised}, {1e3 * self.cpu_s:.2f} ms{ratio}; took {self.advice_s:.1f} s"
         )
 
 
-def outcome(
-    name: str, scene: mstmm.Scene, t_end: float, known: Truth, made: list[Single], asked: float,
+def measure_advice(
+    name: str, scene: mstmm.Scene, t_end: float, truth: Reference, runs: list[Run], target: float,
     rounds: int,
 ) -> Outcome:  # fmt: skip
-    """The advice, and its run and the cheapest ones in alternating rounds."""
-    begin = time.monotonic()
-    advice = mstmm.advise(scene, t_end, error=asked, rounds=2)
-    spent = time.monotonic() - begin
-    ours_model = mstmm.compile(advice.scene, engine="looped")
-    found = timed(ours_model, t_end, **advice.options)
-    assert found is not None
-    measure, truer = known.measure, known
-    measure.register(ours_model, advice.renamed_references)
+    """Measure the advised run and the cheapest ones in alternating rounds."""
+    start_time = time.monotonic()
+    advice = mstmm.advise(scene, t_end, error=target, rounds=2)
+    advice_s = time.monotonic() - start_time
+    advised_model = mstmm.compile(advice.scene, engine="looped")
+    advised_run = run_timed(advised_model, t_end, **advice.options)
+    assert advised_run is not None
+    measure, judging_reference = truth.measure, truth
+    measure.register(advised_model, advice.renamed_references)
     if advice.beam_parts:
-        truer = truth_in_parts(known, set(advice.beam_parts.values()), t_end) or known
-    error = float(measure.distance(measure.read(found[0]), truer.numbers).max())
-    rivals = [None if advice.beam_parts else cheapest(made, asked, sure) for sure in (True, False)]
-    scenes = dict(models(known.base))
+        judging_reference = (
+            reference_in_parts(truth, set(advice.beam_parts.values()), t_end) or truth
+        )
+    error = float(measure.distance(measure.read(advised_run[0]), judging_reference.numbers).max())
+    cheapest_runs = [
+        None if advice.beam_parts else cheapest(runs, target, all_tighter)
+        for all_tighter in (True, False)
+    ]
+    scenes = dict(candidate_models(truth.base))
     compiled = {
-        one: mstmm.compile(scenes[one.model], engine="looped") for one in rivals if one is not None
+        run: mstmm.compile(scenes[run.model], engine="looped")
+        for run in cheapest_runs
+        if run is not None
     }
-    ours, theirs = [found[1]], {one: [one.cpu_s] for one in compiled}
+    advised_times, run_times = [advised_run[1]], {run: [run.cpu_s] for run in compiled}
     for _ in range(rounds):
-        again = timed(ours_model, t_end, **advice.options)
-        assert again is not None
-        ours.append(again[1])
-        for one, model in compiled.items():
-            run = single(model, t_end, one.method, one.rtol)
-            if run is not None:
-                theirs[one].append(run[1])
-    times = [None if one is None else min(theirs[one]) for one in rivals]
-    changes = [
+        repeated = run_timed(advised_model, t_end, **advice.options)
+        assert repeated is not None
+        advised_times.append(repeated[1])
+        for run, model in compiled.items():
+            repetition = run_once(model, t_end, run.method, run.rtol)
+            if repetition is not None:
+                run_times[run].append(repetition[1])
+    cheapest_times = [None if run is None else min(run_times[run]) for run in cheapest_runs]
+    other_changes = [
         text.partition(";")[0].partition(" with a frame")[0] for text in advice.other_changes
     ]
-    advised = "; ".join([*(f"{b.name}: {b.model}" for b in advice.bodies), *changes])
+    advised = "; ".join([*(f"{body.name}: {body.model}" for body in advice.bodies), *other_changes])
     return Outcome(
-        name, asked, error, advice.error, min(ours), None if rivals[0] is None else str(rivals[0]),
-        times[0], times[1], f"{advised}; {advice.method}, {advice.setting}",
-        advice.covers_whole_run, spent, advice.model_saving,
+        name, target, error, advice.error, min(advised_times),
+        None if cheapest_runs[0] is None else str(cheapest_runs[0]),
+        cheapest_times[0], cheapest_times[1], f"{advised}; {advice.method}, {advice.setting}",
+        advice.covers_whole_run, advice_s, advice.model_saving,
     )  # fmt: skip
 
 
-def tried(task: tuple[str, Drawn, int]) -> tuple[str, list[Outcome], float]:
-    """A scene with its outcomes and the error of its reference; no outcomes where that is no
-    good."""
+def run_scene(task: tuple[str, Sample, int]) -> tuple[str, list[Outcome], float]:
+    """A scene with its outcomes and the error of its reference; no outcomes if that is
+    not sufficient."""
     name, (tables, t_end), rounds = task
     scene = mstmm.Scene(**tables)
-    known = truth(scene, t_end)
-    if known is None or known.error > _GOOD * min(ASKED):
-        return name, [], float("inf") if known is None else known.error
-    made = singles(known, t_end, max(ASKED), min(ASKED) / 3)
-    outcomes = [outcome(name, scene, t_end, known, made, asked, rounds) for asked in ASKED]
-    return name, outcomes, known.error
+    truth = compute_reference(scene, t_end)
+    if truth is None or truth.error > _MAX_REFERENCE_ERROR_RATIO * min(TARGET_ERRORS):
+        return name, [], float("inf") if truth is None else truth.error
+    runs = single_runs(truth, t_end, max(TARGET_ERRORS), min(TARGET_ERRORS) / 3)
+    outcomes = [
+        measure_advice(name, scene, t_end, truth, runs, target, rounds) for target in TARGET_ERRORS
+    ]
+    return name, outcomes, truth.error

@@ -16,16 +16,16 @@ COLOURS = {
 }  # fmt: skip
 
 
-def draw(record: dict[str, Any], best: Callable[..., dict[str, float]], path: Path) -> None:
+def draw(record: dict[str, Any], best_times: Callable[..., dict[str, float]], path: Path) -> None:
     """Grouped bars, millions of states per second."""
     figure, axes = plt.subplots(figsize=(10, 4.6))
     figure.subplots_adjust(left=0.07, right=0.985, top=0.92, bottom=0.17)
     results = record["results"]
     width = 0.86 / len(COLOURS)
     for k, (name, colour) in enumerate(COLOURS.items()):
-        rates = [1e3 / best(r, "all_cores_wall_ns")[name] for r in results]
-        places = [i + (k - len(COLOURS) / 2 + 0.5) * width for i in range(len(results))]
-        axes.bar(places, rates, width * 0.92, color=colour, label=name)
+        rates = [1e3 / best_times(r, "all_cores_wall_ns")[name] for r in results]
+        positions = [i + (k - len(COLOURS) / 2 + 0.5) * width for i in range(len(results))]
+        axes.bar(positions, rates, width * 0.92, color=colour, label=name)
     axes.set_yscale("log")
     axes.set_ylabel("million states per second")
     names = [f"{r['kind']}\n{r['bodies']}" for r in results]
@@ -35,5 +35,5 @@ def draw(record: dict[str, Any], best: Callable[..., dict[str, float]], path: Pa
     axes.legend(fontsize=8, ncol=4, loc="upper right")
     low, high = axes.get_ylim()
     axes.set_ylim(low, high * 3)
-    style.footer(figure, record, "Median wall-clock time of 2048 states per call.")
-    style.save(figure, path)
+    style.add_footer(figure, record, "Median wall-clock time of 2048 states per call.")
+    style.save_figure(figure, path)

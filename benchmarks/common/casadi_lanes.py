@@ -1,6 +1,6 @@
 """CasADi's function over SIMD lanes: its C text compiled as C++ with std::experimental::simd.
 
-Nobody ships this; it is what a user of CasADi could do by hand, and so belongs beside our lanes.
+CasADi does not offer this; a user could do it by hand. It is the counterpart of mstmm's lanes.
 """
 
 from __future__ import annotations
@@ -58,14 +58,14 @@ class Lanes:
             generator.generate(folder + "/")
             body = (Path(folder) / "aba.c").read_text()
         text = TEXT % (body, len(numbers), tree.nq, tree.nu)
-        path = native.library("casadi_lanes", text, [f"-{level}", *FLAGS], "g++", ".cpp")
+        path = native.compile_library("casadi_lanes", text, [f"-{level}", *FLAGS], "g++", ".cpp")
         self.library = ctypes.CDLL(str(path))
         pointer = ctypes.c_void_p
         self.library.evaluate_many.argtypes = [pointer, ctypes.c_long, pointer, pointer, pointer]
-        self.numbers = native.aligned(numbers)
+        self.numbers = native.aligned_copy(numbers)
 
-    def __call__(self, q: np.ndarray, u: np.ndarray, out: np.ndarray) -> None:
+    def __call__(self, q: np.ndarray, u: np.ndarray, udot: np.ndarray) -> None:
         """udot into `out`."""
         self.library.evaluate_many(
-            self.numbers.ctypes.data, len(q), q.ctypes.data, u.ctypes.data, out.ctypes.data
+            self.numbers.ctypes.data, len(q), q.ctypes.data, u.ctypes.data, udot.ctypes.data
         )

@@ -32,11 +32,11 @@ int evaluate(const double *restrict p, const double *restrict t, const double *r
 """
 
 #: The function as CasADi writes it.
-PLAIN = "const double *arg[] = {p, q, u, efforts};"
+CALL_ARGUMENTS = "const double *arg[] = {p, q, u, efforts};"
 
 #: All sines and cosines first, so that no call splits the rest: libm's, or eight at a time glibc's
 #: vector library (at most 4 units in the last place off).
-AHEAD = """
+PRECOMPUTED_SINES = """
     double angles[PINS + 7] = {0}, sines[PINS + 7], cosines[PINS + 7];
     static const int place[] = {%s};
     for (int i = 0; i < PINS; i++) angles[i] = q[place[i]];
@@ -51,7 +51,7 @@ LIBMVEC = """for (int i = 0; i < PINS; i += WIDE) {
         __builtin_memcpy(sines + i, &s, sizeof s);
         __builtin_memcpy(cosines + i, &c, sizeof c);
     }"""
-DECLARED = """#define _GNU_SOURCE
+DECLARATIONS = """#define _GNU_SOURCE
 #include <math.h>
 #define PINS %d
 #define WIDE %d
@@ -61,18 +61,12 @@ typedef double vector __attribute__((vector_size(8 * WIDE)));
 vector VECTOR_SIN(vector), VECTOR_COS(vector);
 """
 
-#: Flags tried; the best of them counts.  Nothing here changes results beyond contraction.
+_COMMON = ("-march=native", "-fno-math-errno", "-fno-trapping-math")
+#: Compiler flags by name; the best of them counts.  They change results by contraction only.
 FLAGS = {
-    "O2": ("-O2", "-march=native", "-fno-math-errno", "-fno-trapping-math"),
-    "O2 scalar": (
-        "-O2",
-        "-march=native",
-        "-fno-math-errno",
-        "-fno-trapping-math",
-        "-fno-tree-slp-vectorize",
-    ),
-    "O3": ("-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math"),
-}
+    "O2": ("-O2", *_COMMON), "O2 scalar": ("-O2", *_COMMON, "-fno-tree-slp-vectorize"),
+    "O3": ("-O3", *_COMMON),
+}  # fmt: skip
 
 
 def c_text(function: ca.Function) -> str:
@@ -85,20 +79,20 @@ def c_text(function: ca.Function) -> str:
 
 
 def text_of(tree: Tree, baked: bool, sines: str) -> tuple[str, np.ndarray]:
-    """C with the common signature, and the numbers it wants; sines: "", "libm", "libmvec4", "8"."""
-    function, numbers = articulated_body(tree, baked, ahead=bool(sines))
+    """C with the common signature, and its parameters; sines: "", "libm", "libmvec4", "8"."""
+    function, numbers = articulated_body(tree, baked, precomputed_sines=bool(sines))
     if not sines:
-        return HEAD + c_text(function) + WRAPPER % PLAIN, numbers
-    at, places = 0, []
+        return HEAD + c_text(function) + WRAPPER % CALL_ARGUMENTS, numbers
+    offset, indices = 0, []
     for link in tree.links:
         if link.kind == "pin":
-            places.append(str(at))
-        at += COORDINATES[link.kind][0]
-    wide = 8 if sines.endswith("8") else 4
-    name = "_ZGVeN8v" if wide == 8 else "_ZGVdN4v"
-    declared = DECLARED % (len(places), wide, name, name)
-    prelude = AHEAD % (", ".join(places), LIBM if sines == "libm" else LIBMVEC)
-    return declared + HEAD + c_text(function) + WRAPPER % prelude, numbers
+            indices.append(str(offset))
+        offset += COORDINATES[link.kind][0]
+    width = 8 if sines.endswith("8") else 4
+    name = "_ZGVeN8v" if width == 8 else "_ZGVdN4v"
+    declarations = DECLARATIONS % (len(indices), width, name, name)
+    prelude = PRECOMPUTED_SINES % (", ".join(indices), LIBM if sines == "libm" else LIBMVEC)
+    return declarations + HEAD + c_text(function) + WRAPPER % prelude, numbers
 
 
 def subjects(
@@ -110,14 +104,16 @@ def subjects(
     sines: tuple[str, ...] = ("", "libm", "libmvec4", "libmvec8"),
 ) -> dict[str, native.Subject]:
     """Flags' name -> function and states."""
-    found = {}
+    subjects_by_name = {}
     pins = any(link.kind == "pin" for link in tree.links)
-    for ahead in (s for s in sines if pins or not s):
-        text, numbers = text_of(tree, baked, ahead)
-        for name, chosen in flags.items():
-            options = [*chosen, "-std=gnu17", "-fvisibility=hidden", "-w"]
-            path = native.library("casadi", text, options, after=["-lmvec"])
-            opened = ctypes.CDLL(str(path))
-            address = ctypes.cast(opened.evaluate, ctypes.c_void_p).value
-            found[f"{name} {ahead}".strip()] = native.Subject(address, numbers, q, u, keep=opened)
-    return found
+    for sine_source in (s for s in sines if pins or not s):
+        text, numbers = text_of(tree, baked, sine_source)
+        for name, flag_list in flags.items():
+            options = [*flag_list, "-std=gnu17", "-fvisibility=hidden", "-w"]
+            path = native.compile_library("casadi", text, options, libraries=["-lmvec"])
+            shared_library = ctypes.CDLL(str(path))
+            address = ctypes.cast(shared_library.evaluate, ctypes.c_void_p).value
+            subjects_by_name[f"{name} {sine_source}".strip()] = native.Subject(
+                address, numbers, q, u, owner=shared_library
+            )
+    return subjects_by_name

@@ -1,7 +1,7 @@
-"""C of an adaptive Dormand-Prince 8(5,3) run for peers that bring no integrator of their own.
+"""Adaptive Dormand-Prince 8(5,3) method in C for programs without an integrator.
 
-Coefficients and step control are SciPy's (Hairer, Norsett, Wanner); stages are written out with
-their zeros left away, the state lives on the stack, nothing is allocated.
+Coefficients and step control are SciPy's (Hairer, Norsett, Wanner); stages are unrolled
+without zeros, the state is on the stack, and nothing is allocated.
 """
 
 from __future__ import annotations
@@ -78,12 +78,12 @@ long dop853(accelerations f, const double *context, const double *memory, int nq
 
 
 def combination(weights: np.ndarray) -> str:
-    """Sum of stages with their weights, zeros left away."""
+    """Weighted sum of stages without zeros."""
     parts = [f"{float(w)!r} * K[{j}][i]" for j, w in enumerate(weights) if w != 0]
     return " + ".join(parts).replace("+ -", "- ")
 
 
-def text() -> str:
+def c_source() -> str:
     """The C source."""
     stages = "".join(
         f"        for (int i = 0; i < n; i++) x[i] = y[i] + h * ({combination(table.A[s, :s])});\n"
@@ -91,20 +91,20 @@ def text() -> str:
         f"K[{s}]);\n"
         for s in range(1, 12)
     )
-    last = f"y[i] + h * ({combination(table.B)})"
-    return TEXT % (stages, last, combination(table.E5), combination(table.E3))
+    new_state = f"y[i] + h * ({combination(table.B)})"
+    return TEXT % (stages, new_state, combination(table.E5), combination(table.E3))
 
 
 @cache
 def library() -> ctypes.CDLL:
     """The compiled integrator."""
     flags = ["-O3", "-march=native", "-std=gnu17"]
-    opened = ctypes.CDLL(str(native.library("dop853", text(), flags)))
-    opened.dop853.restype = ctypes.c_long
-    opened.dop853.argtypes = [
+    shared_library = ctypes.CDLL(str(native.compile_library("dop853", c_source(), flags)))
+    shared_library.dop853.restype = ctypes.c_long
+    shared_library.dop853.argtypes = [
         *[ctypes.c_void_p] * 3, *[ctypes.c_int] * 2, *[ctypes.c_double] * 3, ctypes.c_void_p,
     ]  # fmt: skip
-    return opened
+    return shared_library
 
 
 def run(subject: native.Subject, t_end: float, tolerance: float) -> tuple[np.ndarray, int]:

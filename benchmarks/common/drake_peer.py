@@ -28,14 +28,14 @@ def plant_of(tree: Tree) -> MultibodyPlant:
     bodies = [plant.world_body()]
     for link in tree.links:
         carrier = bodies[link.parent + 1]
-        # A body without mass is given one: in the Puma it lies on an axis fixed in space.
+        # A massless body gets a mass: in the Puma it is on an axis fixed in space.
         mass = link.mass or 1.0
         unit = link.inertia / mass
         central = UnitInertia(*np.diag(unit), unit[0, 1], unit[0, 2], unit[1, 2])
         about_origin = central.ShiftFromCenterOfMass(link.center)
         spatial = SpatialInertia(mass, link.center, about_origin, skip_validity_check=True)
         body = plant.AddRigidBody(link.name, spatial)
-        pose = RigidTransform(RotationMatrix(link.turn), link.place)
+        pose = RigidTransform(RotationMatrix(link.orientation), link.position)
         frame = plant.AddFrame(FixedOffsetFrame(f"{link.name}_on", carrier.body_frame(), pose))
         if link.kind == "pin":
             joint = plant.AddJoint(RevoluteJoint(link.name, frame, body.body_frame(), link.axis))
@@ -53,8 +53,8 @@ def plant_of(tree: Tree) -> MultibodyPlant:
 
 def inboard_speeds(angles: np.ndarray, u: np.ndarray) -> np.ndarray:
     """Drake's speeds of a chain of balls: angular velocities in the axes of the inboard frame."""
-    turns = Rotation.from_euler("ZYX", angles.reshape(-1, 3)[:, ::-1])
-    return turns.apply(u.reshape(-1, 3)).ravel()
+    rotations = Rotation.from_euler("ZYX", angles.reshape(-1, 3)[:, ::-1])
+    return rotations.apply(u.reshape(-1, 3)).ravel()
 
 
 class DrakeRun:
@@ -83,12 +83,12 @@ class DrakeRun:
         self.simulator.Initialize()
 
     def accelerations(self, q: np.ndarray, u: np.ndarray) -> np.ndarray:
-        """udot of one state (q and u as Drake has them)."""
+        """udot of one state (q and u of Drake)."""
         self.plant.SetPositionsAndVelocities(self.context, np.concatenate([q, u]))
         return self.plant.get_generalized_acceleration_output_port().Eval(self.context)
 
     def run(self, steps: int) -> None:
-        """That many times `step` from the first state."""
+        """Integrate `steps` fixed steps from the first state."""
         self.context.SetTime(0.0)
         self.plant.SetPositionsAndVelocities(self.context, self.state)
         self.simulator.Initialize()

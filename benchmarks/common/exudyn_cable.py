@@ -1,7 +1,7 @@
 """Exudyn's ANCF cable: a beam that is spun up about its root, and chains of beams on pins.
 
 Cable elements are planar (`ObjectANCFCable2D`), cubic in both coordinates, with slopes at nodes.
-Everything that costs time without being asked for is off: files, sensors, output, threads.
+Files, sensors, output and threads are switched off.
 """
 
 from __future__ import annotations
@@ -36,15 +36,15 @@ Array = np.ndarray
 esym = exu.symbolic
 
 
-class Run:
-    """A system with the place of its last node as the only thing looked at."""
+class CableSystem:
+    """System whose last node can be recorded."""
 
     def __init__(self) -> None:
         self.container = exu.SystemContainer()
         self.system = self.container.AddSystem()
 
-    def finish(self, node: Any) -> None:
-        """All is there: watch this node."""
+    def assemble(self, node: Any) -> None:
+        """Finish the model with a sensor at this node."""
         self.sensor = self.system.AddSensor(
             SensorNode(
                 nodeNumber=node, storeInternal=True,
@@ -74,7 +74,7 @@ class Run:
         tolerance: tuple[float, float],
         newton: str,
         solver: str,
-        watched: bool = False,
+        record_positions: bool = False,
     ) -> float:
         """CPU s of a run by generalised alpha; `tolerance` of Newton, relative and absolute.
 
@@ -90,7 +90,7 @@ class Run:
         integration.newton.modifiedNewtonJacUpdatePerStep = newton == "once a step"
         integration.verboseMode = 0
         settings.solution.file.write = False
-        settings.solution.sensors.active = watched
+        settings.solution.sensors.active = record_positions
         settings.solution.sensors.writePeriod = 1e-12
         settings.linearSolver.solverType = getattr(exu.LinearSolverType, solver)
         settings.linearSolver.reuseAnalyzedPattern = True
@@ -99,14 +99,14 @@ class Run:
         self.system.SolveDynamic(settings, showHints=False, showCausingItems=False)
         return time.process_time() - begin
 
-    def places(self) -> tuple[Array, Array]:
-        """Times (m,) and places (m, 2) of the watched node in the last run that was watched."""
+    def recorded_positions(self) -> tuple[Array, Array]:
+        """Times (m,) and positions (m, 2) of the last node in the last recorded run."""
         data = np.asarray(self.system.GetSensorStoredData(self.sensor))
         return data[:, 0], data[:, 1:3]
 
 
-class SpinUp(Run):
-    """A beam whose root turns by a given angle: both entries of the root's slope are prescribed,
+class SpinUp(CableSystem):
+    """Beam whose root rotates by a given angle: both entries of the root's slope are prescribed,
     by symbolic functions, which Exudyn evaluates without Python."""
 
     def __init__(self, elements: int, reduced: int) -> None:
@@ -121,42 +121,42 @@ class SpinUp(Run):
         ground = self.system.AddMarker(
             MarkerNodeCoordinate(nodeNumber=self.system.AddNode(NodePointGround()), coordinate=0)
         )
-        self.kept = []
+        self.user_functions = []
         for coordinate, function in enumerate((None, None, _cosine_less_one, _sine)):
             marker = self.system.AddMarker(
                 MarkerNodeCoordinate(nodeNumber=nodes[0], coordinate=coordinate)
             )
             number = self.system.AddObject(CoordinateConstraint(markerNumbers=[ground, marker]))
             if function is not None:
-                made = CreateSymbolicUserFunction(
+                user_function = CreateSymbolicUserFunction(
                     self.system, function, "offsetUserFunction", number
                 )
-                self.system.SetObjectParameter(number, "offsetUserFunction", made)
-                self.kept.append(made)
-        self.finish(nodes[-1])
+                self.system.SetObjectParameter(number, "offsetUserFunction", user_function)
+                self.user_functions.append(user_function)
+        self.assemble(nodes[-1])
 
     def deflection(self) -> tuple[Array, Array]:
         """Times and the tip's deflection across the turned axis, m."""
-        times, places = self.places()
+        times, positions = self.recorded_positions()
         angle = Spin.angle(times)
-        return times, np.cos(angle) * places[:, 1] - np.sin(angle) * places[:, 0]
+        return times, np.cos(angle) * positions[:, 1] - np.sin(angle) * positions[:, 0]
 
 
-def _turned(t: Any) -> Any:
+def _root_angle(t: Any) -> Any:
     rate, period = Spin.RATE / Spin.PERIOD, 2 * np.pi / Spin.PERIOD
-    during = rate * (t * t * 0.5 + (esym.cos(t * period) - 1) * (1 / period**2))
-    return esym.IfThenElse(t < Spin.PERIOD, during, Spin.RATE * (t - Spin.PERIOD / 2))
+    spin_up_angle = rate * (t * t * 0.5 + (esym.cos(t * period) - 1) * (1 / period**2))
+    return esym.IfThenElse(t < Spin.PERIOD, spin_up_angle, Spin.RATE * (t - Spin.PERIOD / 2))
 
 
 def _cosine_less_one(mbs: Any, t: Any, item: Any, offset: Any) -> Any:
-    return esym.cos(_turned(t)) - 1
+    return esym.cos(_root_angle(t)) - 1
 
 
 def _sine(mbs: Any, t: Any, item: Any, offset: Any) -> Any:
-    return esym.sin(_turned(t))
+    return esym.sin(_root_angle(t))
 
 
-class Chain(Run):
+class Chain(CableSystem):
     """Strips on pins under gravity, straight and at rest at an angle below the horizontal.
 
     `joint`: "constraint" or "spring" (stiff springs instead of constraints).
@@ -164,19 +164,19 @@ class Chain(Run):
 
     def __init__(self, count: int, elements: int, joint: str = "constraint") -> None:
         super().__init__()
-        along = np.array([np.cos(Strip.BELOW), -np.sin(Strip.BELOW)])
+        direction = np.array([np.cos(Strip.INITIAL_SLOPE), -np.sin(Strip.INITIAL_SLOPE)])
         ground = self.system.AddObject(ObjectGround())
-        carrier = self.system.AddMarker(
+        parent_marker = self.system.AddMarker(
             MarkerBodyPosition(bodyNumber=ground, localPosition=[0, 0, 0])
         )
         length = Strip.LENGTH / elements
-        for member in range(count):
+        for strip_index in range(count):
             nodes = [
                 self.system.AddNode(
                     NodePoint2DSlope1(
                         referenceCoordinates=[
-                            *(along * (member * Strip.LENGTH + i * length)),
-                            *along,
+                            *(direction * (strip_index * Strip.LENGTH + i * length)),
+                            *direction,
                         ]
                     )
                 )
@@ -191,9 +191,11 @@ class Chain(Run):
                 for node in (nodes[0], nodes[-1])
             )
             self.system.AddObject(
-                ObjectJointRevolute2D(markerNumbers=[carrier, first])
+                ObjectJointRevolute2D(markerNumbers=[parent_marker, first])
                 if joint == "constraint"
-                else CartesianSpringDamper(markerNumbers=[carrier, first], stiffness=[1e7] * 3)
+                else CartesianSpringDamper(
+                    markerNumbers=[parent_marker, first], stiffness=[1e7] * 3
+                )
             )
-            carrier = last
-        self.finish(nodes[-1])
+            parent_marker = last
+        self.assemble(nodes[-1])

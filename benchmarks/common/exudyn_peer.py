@@ -23,21 +23,21 @@ EVALUATIONS = {
 }  # fmt: skip
 
 
-def joints(kind: str, axis: np.ndarray) -> list[Any]:
-    """Its joint types of one of our hinges, from the inboard side."""
+def joint_types(kind: str, axis: np.ndarray) -> list[Any]:
+    """Exudyn's joint types for a hinge, from the inboard side."""
     if kind == "pin":
         return [PINS[int(np.flatnonzero(axis)[0])]]
     return [*(SLIDES if kind == "free" else ()), PINS[2], PINS[1], PINS[0]]
 
 
-def angles(quaternion: np.ndarray) -> np.ndarray:
-    """About z, y, x in turn."""
+def euler_angles(quaternion: np.ndarray) -> np.ndarray:
+    """Angles about z, y, x in this order."""
     return Rotation.from_quat(np.roll(quaternion, -1)).as_euler("ZYX")
 
 
-def rates(turn: np.ndarray, omega: np.ndarray) -> np.ndarray:
-    """Of angles about z, y, x from the angular velocity in outboard axes."""
-    _, y, x = turn
+def euler_rates(angles: np.ndarray, omega: np.ndarray) -> np.ndarray:
+    """Rates of the angles about z, y, x from the angular velocity in outboard axes."""
+    _, y, x = angles
     columns = np.array([
         [-np.sin(y), np.cos(y) * np.sin(x), np.cos(y) * np.cos(x)],
         [0.0, np.cos(x), -np.sin(x)],
@@ -46,47 +46,51 @@ def rates(turn: np.ndarray, omega: np.ndarray) -> np.ndarray:
     return np.linalg.solve(columns, omega)
 
 
-def state(tree: Tree, q: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Its coordinates and rates from one state."""
-    own_q, own_u, at_q, at_u = [], [], 0, 0
+def exudyn_state(tree: Tree, q: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Exudyn's coordinates and rates of a state."""
+    exudyn_q, exudyn_u, iq, iu = [], [], 0, 0
     for link in tree.links:
         nq, nu = COORDINATES[link.kind]
-        here, speed = q[at_q : at_q + nq], u[at_u : at_u + nu]
-        at_q, at_u = at_q + nq, at_u + nu
+        coordinates_of_link, speed = q[iq : iq + nq], u[iu : iu + nu]
+        iq, iu = iq + nq, iu + nu
         if link.kind == "pin":
-            own_q.append(here)
-            own_u.append(speed)
+            exudyn_q.append(coordinates_of_link)
+            exudyn_u.append(speed)
             continue
-        turn = angles(here[-4:])
-        own_q.append(np.concatenate([here[:-4], turn]))
-        linear = Rotation.from_quat(np.roll(here[-4:], -1)).apply(speed[:3]) if nu == 6 else []
-        own_u.append(np.concatenate([linear, rates(turn, speed[-3:])]))
-    return np.concatenate(own_q), np.concatenate(own_u)
+        angles_of_ball = euler_angles(coordinates_of_link[-4:])
+        exudyn_q.append(np.concatenate([coordinates_of_link[:-4], angles_of_ball]))
+        linear = (
+            Rotation.from_quat(np.roll(coordinates_of_link[-4:], -1)).apply(speed[:3])
+            if nu == 6
+            else []
+        )
+        exudyn_u.append(np.concatenate([linear, euler_rates(angles_of_ball, speed[-3:])]))
+    return np.concatenate(exudyn_q), np.concatenate(exudyn_u)
 
 
-def coordinates(tree: Tree, own: np.ndarray) -> np.ndarray:
+def coordinates(tree: Tree, angles: np.ndarray) -> np.ndarray:
     """q of a chain of pins and balls from its angles (z, y, x in turn)."""
-    parts, at = [], 0
+    parts, offset = [], 0
     for link in tree.links:
         if link.kind == "pin":
-            parts.append(own[at : at + 1])
-            at += 1
+            parts.append(angles[offset : offset + 1])
+            offset += 1
             continue
-        turn = Rotation.from_euler("ZYX", own[at : at + 3])
-        parts.append(np.roll(turn.as_quat(), 1))
-        at += 3
+        rotation = Rotation.from_euler("ZYX", angles[offset : offset + 3])
+        parts.append(np.roll(rotation.as_quat(), 1))
+        offset += 3
     return np.concatenate(parts)
 
 
 class ExudynRun:
-    """A tree with one start."""
+    """Kinematic tree with an initial state."""
 
     def __init__(self, tree: Tree, q: np.ndarray, u: np.ndarray) -> None:
         if any(link.armature for link in tree.links):
-            raise ValueError("no inertia of drives in its kinematic tree")
+            raise ValueError("the kinematic tree has no drive inertia")
         self.container = exu.SystemContainer()
         self.system = self.container.AddSystem()
-        start = state(tree, q, u)
+        start = exudyn_state(tree, q, u)
         number = len(start[0])
         node = self.system.AddNode(
             NodeGenericODE2(
@@ -101,21 +105,21 @@ class ExudynRun:
         lists: dict[str, list[Any]] = {
             name: [] for name in ("types", "parents", "turns", "places", "I", "c", "m")
         }
-        last: dict[int, int] = {-1: -1}
+        outermost: dict[int, int] = {-1: -1}
         for number, link in enumerate(tree.links):
-            chain = joints(link.kind, link.axis)
-            for position, kind in enumerate(chain):
-                first, final = position == 0, position == len(chain) - 1
-                parent = last[link.parent] if first else len(lists["types"]) - 1
+            chain = joint_types(link.kind, link.axis)
+            for position, joint_type in enumerate(chain):
+                is_first, is_last = position == 0, position == len(chain) - 1
+                parent = outermost[link.parent] if is_first else len(lists["types"]) - 1
                 values = (
-                    kind, parent, link.turn if first else np.eye(3),
-                    link.place if first else np.zeros(3),
-                    link.inertia if final else np.zeros((3, 3)),
-                    link.center if final else np.zeros(3), link.mass if final else 0.0,
+                    joint_type, parent, link.orientation if is_first else np.eye(3),
+                    link.position if is_first else np.zeros(3),
+                    link.inertia if is_last else np.zeros((3, 3)),
+                    link.center if is_last else np.zeros(3), link.mass if is_last else 0.0,
                 )  # fmt: skip
                 for name, value in zip(lists, values, strict=True):
                     lists[name].append(value)
-            last[number] = len(lists["types"]) - 1
+            outermost[number] = len(lists["types"]) - 1
         return ObjectKinematicTree(
             nodeNumber=node, gravity=list(tree.gravity), jointTypes=lists["types"],
             linkParents=lists["parents"], jointTransformations=exu.Matrix3DList(lists["turns"]),
@@ -145,7 +149,7 @@ class ExudynRun:
         settings.parallel.numberOfThreads = 1
         self.system.SolveDynamic(settings, solverType=method)
 
-    def end(self) -> tuple[np.ndarray, np.ndarray]:
+    def end_state(self) -> tuple[np.ndarray, np.ndarray]:
         """Coordinates and rates after the last run."""
         data = self.system.systemData
         return data.GetODE2Coordinates(), data.GetODE2Coordinates_t()
@@ -153,4 +157,4 @@ class ExudynRun:
     def accelerations(self, u: np.ndarray, step: float = 1e-7) -> np.ndarray:
         """Second derivatives at the start, from one explicit step."""
         self.run(step, 1, exu.DynamicSolverType.ExplicitEuler)
-        return (self.end()[1] - u) / step
+        return (self.end_state()[1] - u) / step

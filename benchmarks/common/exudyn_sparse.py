@@ -1,4 +1,4 @@
-"""Exudyn's other form: rigid bodies with joints, sparse matrices, implicit steps."""
+"""Exudyn with rigid bodies and joints in redundant coordinates: sparse, implicit."""
 
 from __future__ import annotations
 
@@ -11,31 +11,31 @@ from exudyn.utilities import RigidBodyInertia
 from .links import Tree
 
 
-def chain_of(tree: Tree) -> Any:
+def build_chain(tree: Tree) -> Any:
     """A chain of pins or balls, all angles zero, every body at its mass centre."""
     container = exu.SystemContainer()
     system = container.AddSystem()
-    carrier, hinge = system.CreateGround(), np.zeros(3)
+    carrier, hinge_position = system.CreateGround(), np.zeros(3)
     for link in tree.links:
-        hinge = hinge + link.place
+        hinge_position = hinge_position + link.position
         body = system.CreateRigidBody(
             inertia=RigidBodyInertia(link.mass, link.inertia),
-            referencePosition=list(hinge + link.center), gravity=list(tree.gravity),
+            referencePosition=list(hinge_position + link.center), gravity=list(tree.gravity),
         )  # fmt: skip
         if link.kind == "pin":
             system.CreateRevoluteJoint(
-                bodyNumbers=[carrier, body], position=list(hinge), axis=list(link.axis),
+                bodyNumbers=[carrier, body], position=list(hinge_position), axis=list(link.axis),
                 useGlobalFrame=True,
             )  # fmt: skip
         else:
-            system.CreateSphericalJoint(bodyNumbers=[carrier, body], position=list(hinge))
+            system.CreateSphericalJoint(bodyNumbers=[carrier, body], position=list(hinge_position))
         carrier = body
     system.Assemble()
     return system, container
 
 
-def run(made: Any, t_end: float, steps: int) -> None:
-    """Generalized alpha with its defaults, sparse solver, nothing written."""
+def run(chain: Any, t_end: float, steps: int) -> None:
+    """Generalized alpha with default settings and the sparse solver."""
     settings = exu.SimulationSettings()
     settings.timeIntegration.numberOfSteps = steps
     settings.timeIntegration.endTime = t_end
@@ -44,4 +44,4 @@ def run(made: Any, t_end: float, steps: int) -> None:
     settings.solutionSettings.writeSolutionToFile = False
     settings.linearSolverType = exu.LinearSolverType.EigenSparse
     settings.parallel.numberOfThreads = 1
-    made[0].SolveDynamic(settings)
+    chain[0].SolveDynamic(settings)

@@ -1,4 +1,4 @@
-"""A scene dictionary as links: one body and the hinge that carries it, for the peers' builders."""
+"""Scene dictionary as a tree of links, for the builders of other programs."""
 
 from __future__ import annotations
 
@@ -14,16 +14,17 @@ COORDINATES = {"pin": (1, 1), "ball": (4, 3), "free": (7, 6)}
 
 @dataclass(frozen=True)
 class Link:
-    """Body axes start at the hinge.  `place` (m) and `turn` (body axes at q = 0 to the carrier's
-    axes) are seen from the carrier; `inertia` is 3 x 3 about the mass centre; `armature` is the
-    inertia of a drive seen at the coordinate."""
+    """A body and its inboard hinge, where the body axes start.
+
+    `position` (m) and `orientation` (body axes at q = 0) are relative to the parent; `inertia`
+    (3, 3) is about the mass centre; `armature` is the drive inertia at the coordinate."""
 
     name: str
     parent: int
     kind: str
     axis: np.ndarray
-    place: np.ndarray
-    turn: np.ndarray
+    position: np.ndarray
+    orientation: np.ndarray
     mass: float
     center: np.ndarray
     inertia: np.ndarray
@@ -54,8 +55,8 @@ def rotation(vector: Any) -> np.ndarray:
         matrix = Rotation.from_quat(np.roll(vector, -1)).as_matrix()
     else:
         matrix = Rotation.from_rotvec(vector).as_matrix()
-    whole = np.round(matrix)
-    return whole if np.abs(matrix - whole).max() < 1e-12 else matrix
+    rounded = np.round(matrix)
+    return rounded if np.abs(matrix - rounded).max() < 1e-12 else matrix
 
 
 def tensor(values: list[float]) -> np.ndarray:
@@ -64,34 +65,34 @@ def tensor(values: list[float]) -> np.ndarray:
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
-def end_of(body: dict[str, Any], name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Place and axes of an output end."""
+def end_frame(body: dict[str, Any], name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Position and axes of an end of a body."""
     end = body["ends"][name]
     if isinstance(end, dict):
         return np.array(end["position"], float), rotation(end.get("orientation", [0, 0, 0]))
     return np.array(end, float), np.eye(3)
 
 
-def links_of(scene: dict[str, Any]) -> Tree:
-    """Links of a scene whose bodies are hung up at their origins; hinges sorted from the root."""
+def link_tree(scene: dict[str, Any]) -> Tree:
+    """Links of a scene whose bodies start at their inboard hinges, sorted from the root."""
     bodies = {body["name"]: body for body in scene["body"]}
-    number = {"ground": -1}
+    link_indices = {"ground": -1}
     links: list[Link] = []
     for hinge in scene["hinge"]:
         carrier, _, end = hinge["inboard"].partition(".")
-        place, axes = end_of(bodies[carrier], end) if end else (
+        position, axes = end_frame(bodies[carrier], end) if end else (
             np.array(hinge.get("position", [0.0, 0.0, 0.0]), float), np.eye(3)
         )  # fmt: skip
         body = bodies[hinge["outboard"]]
-        number[body["name"]] = len(links)
+        link_indices[body["name"]] = len(links)
         links.append(
             Link(
                 name=hinge["name"],
-                parent=number[carrier],
+                parent=link_indices[carrier],
                 kind=hinge["type"],
                 axis=np.array(hinge.get("axis", [0.0, 0.0, 1.0]), float),
-                place=place,
-                turn=axes @ rotation(hinge.get("orientation", [0.0, 0.0, 0.0])),
+                position=position,
+                orientation=axes @ rotation(hinge.get("orientation", [0.0, 0.0, 0.0])),
                 mass=float(body["mass"]),
                 center=np.array(body["center_of_mass"], float),
                 inertia=tensor(body["inertia"]),
@@ -101,16 +102,16 @@ def links_of(scene: dict[str, Any]) -> Tree:
     return Tree(tuple(links), np.array(scene["gravity"], float))
 
 
-def states(tree: Tree, count: int, seed: int = 1) -> tuple[np.ndarray, np.ndarray]:
+def random_states(tree: Tree, count: int, seed: int = 1) -> tuple[np.ndarray, np.ndarray]:
     """Random q (count, nq) and u (count, nu): angles and speeds in -1..1, unit quaternions."""
     rng = np.random.default_rng(seed)
     q, u = rng.uniform(-1, 1, (count, tree.nq)), rng.uniform(-1, 1, (count, tree.nu))
-    at = 0
+    offset = 0
     for link in tree.links:
         size = COORDINATES[link.kind][0]
         if size >= 4:
-            turn = q[:, at + size - 4 : at + size]
-            turn[:, 0] += 2.0
-            turn /= np.linalg.norm(turn, axis=1, keepdims=True)
-        at += size
+            quaternion = q[:, offset + size - 4 : offset + size]
+            quaternion[:, 0] += 2.0
+            quaternion /= np.linalg.norm(quaternion, axis=1, keepdims=True)
+        offset += size
     return q, u

@@ -20,7 +20,7 @@ def quaternion(matrix: np.ndarray) -> np.ndarray:
 
 
 def model_of(tree: Tree) -> mujoco.MjModel:
-    """MuJoCo's model of the tree; through its builder, since deep XML is refused."""
+    """MuJoCo's model of the tree; through its builder, since deeply nested XML is rejected."""
     spec = mujoco.MjSpec()
     spec.option.gravity = tree.gravity
     kinds = {
@@ -28,93 +28,96 @@ def model_of(tree: Tree) -> mujoco.MjModel:
         "free": mujoco.mjtJoint.mjJNT_FREE,
     }  # fmt: skip
     nodes = {-1: spec.worldbody}
-    for number, link in enumerate(tree.links):
-        nodes[number] = nodes[link.parent].add_body(
-            name=link.name, pos=link.place, quat=quaternion(link.turn), mass=1.0,
+    for index, link in enumerate(tree.links):
+        nodes[index] = nodes[link.parent].add_body(
+            name=link.name, pos=link.position, quat=quaternion(link.orientation), mass=1.0,
             ipos=link.center, inertia=[1.0, 1.0, 1.0], explicitinertial=True,
         )  # fmt: skip
-        joint = nodes[number].add_joint(type=kinds[link.kind], axis=link.axis)
+        joint = nodes[index].add_joint(type=kinds[link.kind], axis=link.axis)
         joint.armature = link.armature
     model = spec.compile()
     for link in tree.links:
-        # Written here, because the reader refuses massless links and tabulated inertias.
-        number = model.body(link.name).id
-        model.body_mass[number], model.body_inertia[number] = link.mass, np.diag(link.inertia)
+        # Set here, because the reader rejects massless links and tabulated inertias.
+        index = model.body(link.name).id
+        model.body_mass[index], model.body_inertia[index] = link.mass, np.diag(link.inertia)
         if np.count_nonzero(link.inertia - np.diag(np.diag(link.inertia))):
-            model.body_inertia[number], axes = np.linalg.eigh(link.inertia)
+            model.body_inertia[index], axes = np.linalg.eigh(link.inertia)
             axes[:, 2] *= np.sign(np.linalg.det(axes))
-            model.body_iquat[number] = quaternion(axes)
-            model.body_sameframe[number] = 0
+            model.body_iquat[index] = quaternion(axes)
+            model.body_sameframe[index] = 0
     mujoco.mj_setConst(model, mujoco.MjData(model))
     return model
 
 
-def places(tree: Tree, model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
-    """MuJoCo's q and u from ours: columns, in its order of bodies."""
-    starts, at_q, at_u = [], 0, 0
+def coordinate_indices(tree: Tree, model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
+    """Columns of mstmm's q and u in MuJoCo's order of bodies."""
+    offsets, iq, iu = [], 0, 0
     for link in tree.links:
-        starts.append((at_q, at_u))
-        at_q, at_u = at_q + COORDINATES[link.kind][0], at_u + COORDINATES[link.kind][1]
+        offsets.append((iq, iu))
+        iq, iu = iq + COORDINATES[link.kind][0], iu + COORDINATES[link.kind][1]
     q, u = np.zeros(tree.nq, int), np.zeros(tree.nu, int)
-    for number, link in enumerate(tree.links):
+    for index, link in enumerate(tree.links):
         joint = model.body(link.name).jntadr[0]
         nq, nu = COORDINATES[link.kind]
-        first = model.jnt_qposadr[joint], model.jnt_dofadr[joint]
-        q[first[0] : first[0] + nq] = starts[number][0] + np.arange(nq)
-        u[first[1] : first[1] + nu] = starts[number][1] + np.arange(nu)
+        addresses = model.jnt_qposadr[joint], model.jnt_dofadr[joint]
+        q[addresses[0] : addresses[0] + nq] = offsets[index][0] + np.arange(nq)
+        u[addresses[1] : addresses[1] + nu] = offsets[index][1] + np.arange(nu)
     return q, u
 
 
-def turned(tree: Tree, q: np.ndarray, u: np.ndarray, sign: int) -> np.ndarray:
+def convert_root_speeds(tree: Tree, q: np.ndarray, u: np.ndarray, sign: int) -> np.ndarray:
     """Linear part of a free root's speeds (+1) from outboard to world axes, (-1) back."""
     if tree.links[0].kind != "free":
         return u
-    out = u.copy()
-    turns = Rotation.from_quat(np.roll(q[:, 3:7], -1, axis=1))
-    out[:, :3] = (turns if sign > 0 else turns.inv()).apply(u[:, :3])
-    return out
+    speeds = u.copy()
+    rotations = Rotation.from_quat(np.roll(q[:, 3:7], -1, axis=1))
+    speeds[:, :3] = (rotations if sign > 0 else rotations.inv()).apply(u[:, :3])
+    return speeds
 
 
-def library() -> Path:
-    """mujoco.c beside the wheel's libmujoco."""
-    home = Path(mujoco.__file__).parent
-    shared = next(home.glob("libmujoco.so*"))
-    flags = ["-O3", "-march=native", "-std=gnu17", f"-I{home / 'include'}"]
+def compile_library() -> Path:
+    """Library of mujoco.c, linked to the libmujoco of the wheel."""
+    folder = Path(mujoco.__file__).parent
+    mujoco_library = next(folder.glob("libmujoco.so*"))
+    flags = ["-O3", "-march=native", "-std=gnu17", f"-I{folder / 'include'}"]
     source = (native.HERE / "mujoco.c").read_text()
-    return native.library("mujoco", source, flags, after=[str(shared), f"-Wl,-rpath,{home}"])
+    return native.compile_library(
+        "mujoco", source, flags, libraries=[str(mujoco_library), f"-Wl,-rpath,{folder}"]
+    )
 
 
 def subject(tree: Tree, q: np.ndarray, u: np.ndarray) -> native.Subject:
-    """Function and states in MuJoCo's order; `back` of its accelerations with `accelerations`."""
+    """Function and states in MuJoCo's order; `accelerations` converts its results."""
     model = model_of(tree)
     data = mujoco.MjData(model)
-    opened = ctypes.CDLL(str(library()))
-    f: Any = ctypes.c_void_p.in_dll(opened, "mujoco_accelerations").value
-    pair = (ctypes.c_void_p * 2)(model._address, data._address)
-    of_q, of_u = places(tree, model)
-    found = native.Subject(
-        f, ctypes.addressof(pair), q[:, of_q], turned(tree, q, u, 1)[:, of_u],
-        keep=(opened, pair, model, data),
+    shared_library = ctypes.CDLL(str(compile_library()))
+    f: Any = ctypes.c_void_p.in_dll(shared_library, "mujoco_accelerations").value
+    addresses = (ctypes.c_void_p * 2)(model._address, data._address)
+    q_indices, u_indices = coordinate_indices(tree, model)
+    created = native.Subject(
+        f, ctypes.addressof(addresses), q[:, q_indices], convert_root_speeds(tree, q, u, 1)[:,
+        u_indices],
+        owner=(shared_library, addresses, model, data),
     )  # fmt: skip
-    found.order = of_u
-    return found
+    created.speed_order = u_indices
+    return created
 
 
-def accelerations(found: native.Subject, tree: Tree, q: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """udot in our order and axes."""
-    out = np.zeros_like(u)
-    out[:, found.order] = found.accelerations()
-    out = turned(tree, q, out, -1)
+def accelerations(subject: native.Subject, tree: Tree, q: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """udot in the order and axes of mstmm."""
+    udot = np.zeros_like(u)
+    udot[:, subject.speed_order] = subject.accelerations()
+    udot = convert_root_speeds(tree, q, udot, -1)
     if tree.links[0].kind == "free":
-        out[:, :3] -= np.cross(u[:, 3:6], u[:, :3])
-    return out
+        udot[:, :3] -= np.cross(u[:, 3:6], u[:, :3])
+    return udot
 
 
 class MujocoRun:
     """Fixed steps of MuJoCo's own Runge-Kutta integrator of fourth order, in C."""
 
     def __init__(self, tree: Tree) -> None:
-        mujoco.set_mju_user_warning(lambda _: None)  # or steps too long for it fill a file
+        mujoco.set_mju_user_warning(lambda _: None)  # else long steps fill a log file
         self.model = model_of(tree)
         option = self.model.opt
         option.integrator = mujoco.mjtIntegrator.mjINT_RK4
@@ -124,15 +127,15 @@ class MujocoRun:
             | flags.mjDSBL_ACTUATION | flags.mjDSBL_EQUALITY | flags.mjDSBL_LIMIT
         )  # fmt: skip
         self.data = mujoco.MjData(self.model)
-        self.pair = (ctypes.c_void_p * 2)(self.model._address, self.data._address)
-        self.library = ctypes.CDLL(str(library()))
+        self.addresses = (ctypes.c_void_p * 2)(self.model._address, self.data._address)
+        self.library = ctypes.CDLL(str(compile_library()))
 
     def run(self, q: np.ndarray, u: np.ndarray, t_end: float, steps: int) -> np.ndarray:
         """q at t_end (chains of pins and balls)."""
         self.model.opt.timestep = t_end / steps
         q, u = q.copy(), u.copy()
         self.library.mujoco_run(
-            self.pair, ctypes.c_long(steps), ctypes.c_void_p(q.ctypes.data),
+            self.addresses, ctypes.c_long(steps), ctypes.c_void_p(q.ctypes.data),
             ctypes.c_void_p(u.ctypes.data),
         )  # fmt: skip
         return q

@@ -1,4 +1,4 @@
-"""Compiles C and C++ of the benchmarks, opens it, and times functions of one signature."""
+"""Compile C and C++ of the benchmarks, and time functions of one signature."""
 
 from __future__ import annotations
 
@@ -18,29 +18,29 @@ HERE = Path(__file__).resolve().parent
 BUILD = Path(os.environ.get("BENCHMARK_BUILD", HERE.parents[1] / "build" / "benchmarks"))
 
 
-def library(
+def compile_library(
     name: str,
     text: str,
     flags: Sequence[str],
     compiler: str = "gcc",
     suffix: str = ".c",
-    after: Sequence[str] = (),
+    libraries: Sequence[str] = (),
 ) -> Path:
-    """Shared library of one source text; kept under a name that holds everything it depends on."""
+    """Shared library of a source text, cached by a hash of its text, flags and compiler."""
     header = (HERE / "native.h").read_text()
-    whole = "\0".join([compiler, text, header, *flags, *after])
-    target = BUILD / f"{name}_{hashlib.sha256(whole.encode()).hexdigest()[:16]}.so"
+    hashed_text = "\0".join([compiler, text, header, *flags, *libraries])
+    target = BUILD / f"{name}_{hashlib.sha256(hashed_text.encode()).hexdigest()[:16]}.so"
     if target.exists():
         return target
     BUILD.mkdir(parents=True, exist_ok=True)
     source = target.with_suffix(suffix)
     source.write_text(text)
-    half = target.with_suffix(f".{os.getpid()}")
-    command = [compiler, *flags, f"-I{HERE}", "-shared", "-fPIC", str(source), "-o", str(half)]
-    begin = time.perf_counter()
-    subprocess.run([*command, *after, "-lm"], check=True)
-    half.rename(target)
-    target.with_suffix(".seconds").write_text(str(time.perf_counter() - begin))
+    partial = target.with_suffix(f".{os.getpid()}")
+    command = [compiler, *flags, f"-I{HERE}", "-shared", "-fPIC", str(source), "-o", str(partial)]
+    start_time = time.perf_counter()
+    subprocess.run([*command, *libraries, "-lm"], check=True)
+    partial.rename(target)
+    target.with_suffix(".seconds").write_text(str(time.perf_counter() - start_time))
     return target
 
 
@@ -55,31 +55,31 @@ class _Subject(ctypes.Structure):
 
 
 @cache
-def loops() -> ctypes.CDLL:
+def timing_loops() -> ctypes.CDLL:
     """The timing loops of native.c."""
     text = (HERE / "native.c").read_text()
     flags = ["-O2", "-march=native", "-std=gnu17", "-fno-tree-vectorize"]
-    opened = ctypes.CDLL(str(library("loops", text, flags)))
-    opened.throughput.restype = opened.chained.restype = ctypes.c_double
-    for function in (opened.throughput, opened.chained):
+    shared_library = ctypes.CDLL(str(compile_library("loops", text, flags)))
+    shared_library.throughput.restype = shared_library.chained.restype = ctypes.c_double
+    for function in (shared_library.throughput, shared_library.chained):
         function.argtypes = [ctypes.POINTER(_Subject), ctypes.c_int]
-    opened.evaluate_all.argtypes = [ctypes.POINTER(_Subject), ctypes.c_void_p]
-    return opened
+    shared_library.evaluate_all.argtypes = [ctypes.POINTER(_Subject), ctypes.c_void_p]
+    return shared_library
 
 
-def aligned(array: np.ndarray) -> np.ndarray:
-    """A contiguous copy that starts at a cache line."""
+def aligned_copy(array: np.ndarray) -> np.ndarray:
+    """Contiguous copy that starts at a cache line."""
     array = np.asarray(array, dtype=np.float64)
-    room = np.zeros(array.size + 8)
-    first = (-room.ctypes.data // 8) % 8
-    out = room[first : first + array.size].reshape(array.shape)
-    out[...] = array
-    return out
+    buffer = np.zeros(array.size + 8)
+    first = (-buffer.ctypes.data // 8) % 8
+    view = buffer[first : first + array.size].reshape(array.shape)
+    view[...] = array
+    return view
 
 
 @dataclass
 class Subject:
-    """A function under test with the states it walks through.
+    """Function under test and the states at which it is evaluated.
 
     f: address of a function of the signature in native.h; context: address, or an array.
     """
@@ -89,17 +89,17 @@ class Subject:
     q: np.ndarray
     u: np.ndarray
     memory: np.ndarray | None = None
-    keep: object = None
+    owner: object = None
     record: _Subject = field(init=False)
-    order: np.ndarray = field(init=False)  # where a peer's speeds stand among ours, if elsewhere
+    speed_order: np.ndarray = field(init=False)  # indices of its speeds in mstmm's, if reordered
 
     def __post_init__(self) -> None:
-        self.q, self.u = aligned(self.q), aligned(self.u)
+        self.q, self.u = aligned_copy(self.q), aligned_copy(self.u)
         nq, nu = self.q.shape[1], self.u.shape[1]
-        self.work = [aligned(np.zeros(k)) for k in (nq, nu, nq + 2 * nu)]
+        self.work = [aligned_copy(np.zeros(k)) for k in (nq, nu, nq + 2 * nu)]
         if isinstance(self.context, np.ndarray):
-            self.context = aligned(self.context)
-        self.memory = aligned(np.zeros(8) if self.memory is None else self.memory)
+            self.context = aligned_copy(self.context)
+        self.memory = aligned_copy(np.zeros(8) if self.memory is None else self.memory)
         context = self.context
         address = context.ctypes.data if isinstance(context, np.ndarray) else context
         self.record = _Subject(
@@ -109,15 +109,15 @@ class Subject:
 
     def accelerations(self) -> np.ndarray:
         """udot of every state."""
-        out = np.zeros_like(self.u)
-        if loops().evaluate_all(ctypes.byref(self.record), out.ctypes.data):
-            raise RuntimeError("a peer refused a state")
-        return out
+        view = np.zeros_like(self.u)
+        if timing_loops().evaluate_all(ctypes.byref(self.record), view.ctypes.data):
+            raise RuntimeError("a program rejected a state")
+        return view
 
     def time(self, chained: bool, rounds: int) -> float:
         """CPU ns per evaluation over `rounds` walks through the states."""
-        function = loops().chained if chained else loops().throughput
-        spent = function(ctypes.byref(self.record), rounds)
-        if spent < 0:
-            raise RuntimeError("a peer refused a state")
-        return spent / (rounds * len(self.q))
+        function = timing_loops().chained if chained else timing_loops().throughput
+        duration = function(ctypes.byref(self.record), rounds)
+        if duration < 0:
+            raise RuntimeError("a program rejected a state")
+        return duration / (rounds * len(self.q))

@@ -1,4 +1,4 @@
-"""More digits than double has: CasADi's equations in long double; accelerations and runs (RK4)."""
+"""References in long double by CasADi's equations: accelerations, and runs by RK4."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ void run(double t_end, long steps, double *state)
 """
 
 
-def _library(tree: Tree, level: str) -> ctypes.CDLL:
+def _compiled_library(tree: Tree, level: str) -> ctypes.CDLL:
     function, _ = articulated_body(tree, baked=True)
     with tempfile.TemporaryDirectory() as folder:
         options = {"casadi_real": "long double", "include_math": False}
@@ -69,12 +69,12 @@ def _library(tree: Tree, level: str) -> ctypes.CDLL:
         body = (Path(folder) / "aba.c").read_text()
     size = tree.nq + tree.nu
     text = TEXT % (body, tree.nu, tree.nq, tree.nq, size, tree.nq, size)
-    return ctypes.CDLL(str(native.library("reference", text, [level, "-std=gnu17", "-w"])))
+    return ctypes.CDLL(str(native.compile_library("reference", text, [level, "-std=gnu17", "-w"])))
 
 
 def end_state(tree: Tree, q: np.ndarray, u: np.ndarray, t_end: float, steps: int) -> np.ndarray:
-    """[q, u] at t_end."""
-    library = _library(tree, "-O2")
+    """State [q, u] at t_end."""
+    library = _compiled_library(tree, "-O2")
     library.run.argtypes = [ctypes.c_double, ctypes.c_long, ctypes.c_void_p]
     state = np.concatenate([q, u]).astype(float)
     library.run(t_end, steps, state.ctypes.data)
@@ -83,9 +83,9 @@ def end_state(tree: Tree, q: np.ndarray, u: np.ndarray, t_end: float, steps: int
 
 def accelerations(tree: Tree, q: np.ndarray, u: np.ndarray) -> np.ndarray:
     """udot (n, nu) of states q (n, nq), u (n, nu)."""
-    library, out = _library(tree, "-O0"), np.zeros_like(u)
+    library, udot = _compiled_library(tree, "-O0"), np.zeros_like(u)
     q, u = np.ascontiguousarray(q), np.ascontiguousarray(u)
     pointer = ctypes.c_void_p
     library.accelerations.argtypes = [ctypes.c_long, pointer, pointer, pointer]
-    library.accelerations(len(q), q.ctypes.data, u.ctypes.data, out.ctypes.data)
-    return out
+    library.accelerations(len(q), q.ctypes.data, u.ctypes.data, udot.ctypes.data)
+    return udot

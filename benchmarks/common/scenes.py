@@ -1,4 +1,4 @@
-"""The scenes of the benchmarks, as scene dictionaries of mstmm; the one place with their data."""
+"""Scenes of the benchmarks as scene dictionaries."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def puma(n: int = 6) -> Scene:
 
 
 def arm(n: int) -> Scene:
-    """An arm as robots have it: links with offsets and full inertias, axes along and across."""
+    """Robot-like arm: links with offsets and full inertias, axes along and across."""
     scene = chain(n, [0.0, 0.0, -9.81], lambda i: {"type": "pin", "axis": AXES[2 - i % 2]})
     for i, body in enumerate(scene["body"]):
         body |= {
@@ -85,13 +85,19 @@ def long_chain(kind: str, n: int) -> Scene:
         "balls": {"type": "ball"},
         "planar": {"type": "pin", "axis": AXES[2]},
     }
-    chained = {"name": "rods", "count": n, "inboard": "ground", "body": body, "hinge": kinds[kind]}
+    chain_table = {
+        "name": "rods",
+        "count": n,
+        "inboard": "ground",
+        "body": body,
+        "hinge": kinds[kind],
+    }
     gravity = [0.0, -9.81, 0.0] if kind == "planar" else [0.0, 0.0, -9.81]
-    return {"schema_version": 1, "gravity": gravity, "chain": [chained]}
+    return {"schema_version": 1, "gravity": gravity, "chain": [chain_table]}
 
 
-def hanging(scene: Scene, q: list[list[float]], u: list[list[float]]) -> Scene:
-    """The chain hanging along x, started from there."""
+def hanging_chain(scene: Scene, q: list[list[float]], u: list[list[float]]) -> Scene:
+    """Chain along x under gravity along x, with an initial state."""
     scene["gravity"] = [9.81, 0.0, 0.0]
     for hinge, angle, speed in zip(scene["hinge"], q, u, strict=True):
         hinge["initial"] = {"q": angle, "u": speed}
@@ -99,21 +105,25 @@ def hanging(scene: Scene, q: list[list[float]], u: list[list[float]]) -> Scene:
 
 
 def swinging_arm() -> Scene:
-    """Three rods on pins (x, y, z), let go bent by up to 40 degrees: not chaotic within 10 s."""
-    return hanging(pins(3), [[0.35], [0.7], [0.56]], [[1.4], [0.0], [0.0]])
+    """Three rods on pins (x, y, z), released at up to 40 degrees: not chaotic within 10 s."""
+    return hanging_chain(pins(3), [[0.35], [0.7], [0.56]], [[1.4], [0.0], [0.0]])
 
 
 def swinging_balls() -> Scene:
     """Three rods on balls, turned by up to 40 degrees and spinning."""
-    turns = ((0.0, 0.7, 0.0), (0.0, 0.35, 0.35), (0.0, 0.0, 0.49))
-    starts = []
-    for turn in turns:
-        angle = math.hypot(*turn)
-        starts.append([math.cos(angle / 2), *(math.sin(angle / 2) * x / angle for x in turn)])
-    return hanging(balls(3), starts, [[0.35, 0.0, 0.7], [0.0, -0.35, 0.0], [0.0, 0.0, 0.7]])
+    rotations = ((0.0, 0.7, 0.0), (0.0, 0.35, 0.35), (0.0, 0.0, 0.49))
+    quaternions = []
+    for rotation_vector in rotations:
+        angle = math.hypot(*rotation_vector)
+        quaternions.append(
+            [math.cos(angle / 2), *(math.sin(angle / 2) * x / angle for x in rotation_vector)]
+        )
+    return hanging_chain(
+        balls(3), quaternions, [[0.35, 0.0, 0.7], [0.0, -0.35, 0.0], [0.0, 0.0, 0.7]]
+    )
 
 
-#: name, carried by, place on it (m), axis, mass (kg), mass centre (m), inertia (kg m2).
+#: name, inboard body, position on it (m), axis, mass (kg), mass centre (m), inertia (kg m2).
 LEG = (
     ("hip_yaw", "pelvis", (0.0, 0.09, -0.06), 2, 2.1, (0.012, 0.004, -0.055),
      (0.0082, 0.0079, 0.0031, 0.0001, -0.0004, 0.0002)),
@@ -151,19 +161,19 @@ TRUNK = (
 PELVIS = (6.2, (-0.004, 0.001, 0.012), (0.0410, 0.0290, 0.0390, 0.0001, -0.0008, 0.0002))
 
 
-def mirrored(part: tuple[Any, ...], names: set[str]) -> tuple[Any, ...]:
-    """The right limb from the left one: y turned round."""
-    name, carrier, (x, y, z), axis, mass, (cx, cy, cz), (xx, yy, zz, xy, xz, yz) = part
-    carried = f"right_{carrier}" if carrier in names else carrier
+def mirror_limb(limb: tuple[Any, ...], names: set[str]) -> tuple[Any, ...]:
+    """Right limb from the left one by a reflection of y."""
+    name, left_parent, (x, y, z), axis, mass, (cx, cy, cz), (xx, yy, zz, xy, xz, yz) = limb
+    parent = f"right_{left_parent}" if left_parent in names else left_parent
     center, inertia = (cx, -cy, cz), (xx, yy, zz, -xy, xz, -yz)
-    return (f"right_{name}", carried, (x, -y, z), axis, mass, center, inertia)
+    return (f"right_{name}", parent, (x, -y, z), axis, mass, center, inertia)
 
 
 def humanoid(n: int = 25) -> Scene:
-    """A walking robot's size: a free pelvis and 24 pins, 30 degrees of freedom; data made up."""
+    """Tree of the size of a humanoid robot: a free pelvis and 24 pins; invented data."""
     limbs = LEG + ARM
-    names = {part[0] for part in limbs}
-    parts = (*TRUNK, *limbs, *(mirrored(part, names) for part in limbs))
+    names = {limb[0] for limb in limbs}
+    parts = (*TRUNK, *limbs, *(mirror_limb(limb, names) for limb in limbs))
     mass, center, inertia = PELVIS
     bodies: list[dict[str, Any]] = [
         {"name": "pelvis", "mass": mass, "center_of_mass": list(center), "inertia": list(inertia)}
@@ -172,13 +182,13 @@ def humanoid(n: int = 25) -> Scene:
         {"name": "root", "type": "free", "inboard": "ground", "outboard": "pelvis"}
     ]
     ends: dict[str, dict[str, list[float]]] = {}
-    for name, carrier, place, axis, mass, center, inertia in parts:
-        ends.setdefault(carrier, {})[name] = list(place)
+    for name, parent, position, axis, mass, center, inertia in parts:
+        ends.setdefault(parent, {})[name] = list(position)
         bodies.append(
             {"name": name, "mass": mass, "center_of_mass": list(center), "inertia": list(inertia)}
         )
         hinges.append(
-            {"name": f"{name}_joint", "type": "pin", "inboard": f"{carrier}.{name}",
+            {"name": f"{name}_joint", "type": "pin", "inboard": f"{parent}.{name}",
              "outboard": name, "axis": AXES[axis]}
         )  # fmt: skip
     for body in bodies:

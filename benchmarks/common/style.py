@@ -1,7 +1,8 @@
-"""One look for all pictures."""
+"""Line styles, layout and footer of all pictures."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +11,8 @@ import matplotlib as mpl
 mpl.use("Agg")
 import matplotlib.pyplot as plt
 
-#: Colour, marker and line of each family; mstmm in strong colours, peers told apart in print too.
-LOOKS: dict[str, dict[str, Any]] = {
+#: Colour, marker and line of each program; mstmm in strong colours, all distinct in print.
+LINE_STYLES: dict[str, dict[str, Any]] = {
     "mstmm fused": {"color": "#c1121f", "marker": "o", "lw": 2.2, "zorder": 5},
     "mstmm looped": {"color": "#f4791f", "marker": "s", "lw": 2.2, "zorder": 5},
     "mstmm": {"color": "#c1121f", "marker": "o", "lw": 2.2, "zorder": 5},
@@ -36,23 +37,28 @@ mpl.rcParams.update(
 )  # fmt: skip
 
 
-def look(name: str) -> dict[str, Any]:
-    """Line style of a family."""
-    return {"label": name, **LOOKS[name]}
+def line_style(name: str) -> dict[str, Any]:
+    """Line style and label of a program."""
+    return {"label": name, **LINE_STYLES[name]}
 
 
-def footer(figure: Any, record: dict[str, Any], text: str) -> None:
-    """What it was taken on, and when."""
-    at = record["machine"]
-    figure.text(
-        0.01, 0.005,
-        f"{text}  {at['cores']}-core {at['processor']} ({at['vectors']}), gcc {at['gcc']}, "
-        f"{at['date']}.",
-        fontsize=7, color="#555555", ha="left", va="bottom",
-    )  # fmt: skip
+def add_footer(figure: Any, record: dict[str, Any], text: str) -> None:
+    """Note with the machine and the date."""
+    note = "{cores}-core {processor} ({vectors}), gcc {gcc}, {date}.".format(**record["machine"])
+    figure.text(0.01, 0.005, f"{text}  {note}", fontsize=7, color="#555555", ha="left", va="bottom")
 
 
-def save(figure: Any, path: Path) -> None:
-    """PNG."""
+def save_figure(figure: Any, path: Path) -> None:
+    """Write a PNG file."""
     figure.savefig(path)
     plt.close(figure)
+
+
+def pareto_front(points: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Pairs (error, time) that no other pair beats in both, from the largest error on."""
+    front: list[tuple[float, float]] = []
+    for error, time in sorted(points, reverse=True):
+        while front and front[-1][1] >= time:
+            front.pop()
+        front.append((error, time))
+    return front

@@ -1,4 +1,4 @@
-"""What single runs cost and how far they err: every adaptive method over its tolerances."""
+"""Cost and error of single runs: every adaptive method over its tolerances."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from mstmm.runtime.result.error_measure import Coordinates
 TOLERANCES = tuple(10.0**-k for k in range(2, 13))
 ATOL_PART = 0.01
 
-#: Steps after which a run is given up: one that may be the cheapest, and one for the reference.
-_MOST_STEPS, _MOST_FOR_REFERENCE = 40_000, 300_000
+#: Step limits of candidate runs and of reference runs.
+_MAX_STEPS, _MAX_REFERENCE_STEPS = 40_000, 300_000
 
 #: Runs whose distance to each other is the reference's error: method and relative tolerance.
 _REFERENCES = (
@@ -25,16 +25,16 @@ _REFERENCES = (
     ("kvaerno5", 1e-10), ("rodas5p", 1e-11),
 )  # fmt: skip
 
-#: A method is followed no further where it costs so many times the cheapest run that errs by less.
-_HOPELESS = 20.0
+#: Cost ratio to the cheapest more accurate run at which a method is stopped.
+_MAX_COST_RATIO = 20.0
 
-#: Samples at which errors are looked at.
+#: Number of times at which errors are compared.
 SAMPLES = 101
 
 
 @dataclass(frozen=True)
 class Reference:
-    """The truth and how far it may be off."""
+    """Reference solution and its error."""
 
     numbers: np.ndarray
     error: float
@@ -43,8 +43,8 @@ class Reference:
 
 
 @dataclass(frozen=True)
-class Single:
-    """A single run: its error and the processor time of the call, the least of its repeats."""
+class Run:
+    """A single run: its error and minimum CPU time."""
 
     method: str
     rtol: float
@@ -53,49 +53,51 @@ class Single:
 
 
 def adaptive_methods() -> tuple[str, ...]:
-    """All of the package that choose their steps."""
+    """Names of all adaptive methods of the package."""
     return (*(name for name in names() if get(name).adaptive), AUTO)
 
 
-def times(t_end: float) -> np.ndarray:
-    """The samples of a run."""
+def sample_times(t_end: float) -> np.ndarray:
+    """Output times of a run."""
     return np.linspace(0.0, t_end, SAMPLES)
 
 
-def timed(model: mstmm.Model, t_end: float, **options: Any) -> tuple[mstmm.Result, float]:
-    """A run and the processor time of its call, s."""
-    grid = times(t_end)
-    begin = time.process_time()
-    result = model.simulate(t_end, output_times=grid, **options)
-    return result, time.process_time() - begin
+def run_timed(model: mstmm.Model, t_end: float, **options: Any) -> tuple[mstmm.Result, float]:
+    """A run and its CPU time, s."""
+    output_times = sample_times(t_end)
+    start_time = time.process_time()
+    result = model.simulate(t_end, output_times=output_times, **options)
+    return result, time.process_time() - start_time
 
 
-def single(
-    model: mstmm.Model, t_end: float, method: str, rtol: float, most: int = _MOST_STEPS
+def run_once(
+    model: mstmm.Model, t_end: float, method: str, rtol: float, max_steps: int = _MAX_STEPS
 ) -> tuple[mstmm.Result, float] | None:
-    """One run of a method at a tolerance; None where it does not reach the end in `most` steps."""
+    """One run of a method at a tolerance; None where it does not reach the end in `max_steps`."""
     try:
-        limited = mstmm.methods.Method(method, max_steps=most)
-        result, spent = timed(model, t_end, method=limited, rtol=rtol, atol=ATOL_PART * rtol)
+        method_settings = mstmm.methods.Method(method, max_steps=max_steps)
+        result, cpu_s = run_timed(
+            model, t_end, method=method_settings, rtol=rtol, atol=ATOL_PART * rtol
+        )
     except mstmm.MstmmError:
         return None
-    return (result, spent) if result.success else None
+    return (result, cpu_s) if result.success else None
 
 
-def reference(model: mstmm.Model, t_end: float) -> Reference | None:
+def compute_reference(model: mstmm.Model, t_end: float) -> Reference | None:
     """The run that agrees best with one of another method; None where no two reach the end."""
     runs = {}
     for method, rtol in _REFERENCES:
-        found = single(model, t_end, method, rtol, _MOST_FOR_REFERENCE)
-        if found is not None:
-            runs[method, rtol] = found[0].q
+        run = run_once(model, t_end, method, rtol, _MAX_REFERENCE_STEPS)
+        if run is not None:
+            runs[method, rtol] = run[0].q
     measure = Coordinates(model)
     pairs = []
     for a, q in runs.items():
         measure.set_scales(q)
         pairs += [
-            (float(measure.distance(q, other).max()), a, b)
-            for b, other in runs.items()
+            (float(measure.distance(q, other_q).max()), a, b)
+            for b, other_q in runs.items()
             if a[0] != b[0]
         ]
     if not pairs:
@@ -105,33 +107,37 @@ def reference(model: mstmm.Model, t_end: float) -> Reference | None:
     return Reference(runs[a], error, f"{a[0]} {a[1]:.0e} and {b[0]} {b[1]:.0e}", measure)
 
 
-def singles(
-    model: mstmm.Model, t_end: float, truth: Reference, least: float, repeats: int
-) -> list[Single]:
-    """Every method from loose to tight, until it errs by less than `least` or is hopeless."""
-    found: list[Single] = []
+def single_runs(
+    model: mstmm.Model, t_end: float, reference: Reference, min_error: float, repeats: int
+) -> list[Run]:
+    """Runs of every method from loose to tight, up to `min_error` or to excessive cost."""
+    runs: list[Run] = []
     for method in adaptive_methods():
         for rtol in TOLERANCES:
-            made = single(model, t_end, method, rtol)
-            if made is None:
+            run = run_once(model, t_end, method, rtol)
+            if run is None:
                 break
-            error = float(truth.measure.distance(truth.numbers, made[0].q).max())
-            found.append(Single(method, rtol, error, made[1]))
-            better = [one.cpu_s for one in found if one.error <= max(error, least)]
-            if error < least or made[1] > _HOPELESS * min(better):
+            error = float(reference.measure.distance(reference.numbers, run[0].q).max())
+            runs.append(Run(method, rtol, error, run[1]))
+            competing = [
+                candidate.cpu_s for candidate in runs if candidate.error <= max(error, min_error)
+            ]
+            if error < min_error or run[1] > _MAX_COST_RATIO * min(competing):
                 break
-    return _again(model, t_end, found, repeats)
+    return _repeat_competitive(model, t_end, runs, repeats)
 
 
-def _again(model: mstmm.Model, t_end: float, found: list[Single], repeats: int) -> list[Single]:
-    """The least of several times for every run that may be the cheapest for some error."""
-    better = []
-    for one in found:
-        rivals = [other.cpu_s for other in found if other.error <= one.error]
-        spent = one.cpu_s
-        if spent <= 2.0 * min(rivals) + 1e-3:
+def _repeat_competitive(
+    model: mstmm.Model, t_end: float, runs: list[Run], repeats: int
+) -> list[Run]:
+    """Minimum of several times for each run that may be the cheapest for some error."""
+    repeated = []
+    for candidate in runs:
+        cheaper = [rival.cpu_s for rival in runs if rival.error <= candidate.error]
+        cpu_s = candidate.cpu_s
+        if cpu_s <= 2.0 * min(cheaper) + 1e-3:
             for _ in range(repeats - 1):
-                made = single(model, t_end, one.method, one.rtol)
-                spent = spent if made is None else min(spent, made[1])
-        better.append(Single(one.method, one.rtol, one.error, spent))
-    return better
+                run = run_once(model, t_end, candidate.method, candidate.rtol)
+                cpu_s = cpu_s if run is None else min(cpu_s, run[1])
+        repeated.append(Run(candidate.method, candidate.rtol, candidate.error, cpu_s))
+    return repeated

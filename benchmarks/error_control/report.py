@@ -1,4 +1,4 @@
-"""Counts over all outcomes, as a page."""
+"""Page of counts over all outcomes."""
 
 from __future__ import annotations
 
@@ -7,56 +7,68 @@ from typing import Any
 
 from .trials import Outcome
 
-#: What is counted: in words, when it holds, and in how many of a hundred it was asked for.
+#: Text, criterion and target share in percent of each count.
 COUNTS: tuple[tuple[str, Callable[[Outcome], bool | None], int], ...] = (
-    ("true error at most 10 times the estimate", lambda one: one.told, 95),
-    ("true error at most 3 times what was asked", lambda one: one.kept, 90),
-    ("time at most 3 times the cheapest single run", lambda one: one.cheap(3.0), 90),
-    ("time at most 4 times the cheapest single run", lambda one: one.cheap(4.0), 0),
-    ("time at most 3 times the cheapest sure setting", lambda one: one.cheap(3.0, sure=True), 0),
-    ("the result says that it is met", lambda one: one.met, 0),
+    ("true error at most 10 times the estimate", lambda trial: trial.is_estimate_valid, 95),
+    ("true error at most 3 times the target", lambda trial: trial.is_met, 90),
+    ("time at most 3 times the cheapest single run", lambda trial: trial.is_within(3.0), 90),
+    ("time at most 4 times the cheapest single run", lambda trial: trial.is_within(4.0), 0),
+    (
+        "time at most 3 times the cheapest sure setting",
+        lambda trial: trial.is_within(3.0, only_sure=True),
+        0,
+    ),
+    ("the result reports that the target is met", lambda trial: trial.reports_met, 0),
 )
 
 
-def share(outcomes: Sequence[Outcome], holds: Callable[[Outcome], bool | None]) -> str:
-    """How many, as 45 of 50 (90 %)."""
-    found = [value for one in outcomes if (value := holds(one)) is not None]
-    part = 100 * sum(found) / len(found) if found else 0.0
-    return f"{sum(found)} of {len(found)} ({part:.0f} %)"
+def share(outcomes: Sequence[Outcome], criterion: Callable[[Outcome], bool | None]) -> str:
+    """Share as text: 45 of 50 (90 %)."""
+    values = [value for trial in outcomes if (value := criterion(trial)) is not None]
+    part = 100 * sum(values) / len(values) if values else 0.0
+    return f"{sum(values)} of {len(values)} ({part:.0f} %)"
 
 
 def table(outcomes: Sequence[Outcome], data: dict[str, Any]) -> str:
-    """The page: counts by error asked for, counts and median ratio by family, what has failed."""
-    asked = sorted({one.asked for one in outcomes}, reverse=True)
-    scenes = len({one.scene for one in outcomes})
+    """Page: counts by target error and by family, median ratios, exceptions."""
+    target = sorted({trial.target for trial in outcomes}, reverse=True)
+    scenes = len({trial.scene for trial in outcomes})
     machine = data["machine"]
     lines = [
-        "# Errors that were asked for",
+        "# Target errors",
         "",
         f"{scenes} scenes of {data['scenes_drawn']} drawn, {data['each']} of each family, "
         f"seed {data['seed']}; "
-        f"families that the rule was {'set' if data['families'] == 'tuning' else 'not set'} on.  "
+        f"families that were {'' if data['families'] == 'tuning' else 'not '}used to set the rule. "
         f"{machine['processor']}, load {machine['load']:.1f}.  "
-        "A sure setting is one that meets the error as do all tighter ones of its method.",
+        "A setting is sure if all tighter settings of its method meet the target too.",
         "",
-        "| | aim | all | " + " | ".join(f"{x:.0e}" for x in asked) + " |",
-        "|---|---|---|" + "---|" * len(asked),
+        "| | target | all | " + " | ".join(f"{error:.0e}" for error in target) + " |",
+        "|---|---|---|" + "---|" * len(target),
     ]
-    for words, holds, aim in COUNTS:
-        cells = [share([one for one in outcomes if one.asked == x], holds) for x in asked]
+    for text, criterion, aim in COUNTS:
+        cells = [
+            share([trial for trial in outcomes if trial.target == error], criterion)
+            for error in target
+        ]
         goal = f"{aim} %" if aim else ""
-        lines.append(f"| {words} | {goal} | {share(outcomes, holds)} | {' | '.join(cells)} |")
-    lines += ["", "| family | told | kept | time within 3 | median of time / cheapest |",
+        lines.append(f"| {text} | {goal} | {share(outcomes, criterion)} | {' | '.join(cells)} |")
+    lines += ["", "| family | estimate valid | target met | time within 3 | median ratio |",
               "|---|---|---|---|---|"]  # fmt: skip
-    for family in dict.fromkeys(one.family for one in outcomes):
-        some = [one for one in outcomes if one.family == family]
-        ratios = sorted(one.ratio for one in some if one.ratio is not None)
-        cells = [share(some, holds) for _, holds, _ in COUNTS[:3]]
+    for family in dict.fromkeys(trial.family for trial in outcomes):
+        members = [trial for trial in outcomes if trial.family == family]
+        ratios = sorted(trial.ratio for trial in members if trial.ratio is not None)
+        cells = [share(members, criterion) for _, criterion, _ in COUNTS[:3]]
         middle = f"{ratios[len(ratios) // 2]:.2f}" if ratios else "-"
         lines.append(f"| {family} | {' | '.join(cells)} | {middle} |")
-    bad = [one for one in outcomes if not (one.told and one.kept)]
-    lines += ["", "Not told or not kept:", "", *(f"    {one.line()}" for one in bad)]
+    exceptions = [trial for trial in outcomes if not (trial.is_estimate_valid and trial.is_met)]
+    lines += [
+        "",
+        "Estimate not valid or target not met:",
+        "",
+        *(f"    {trial.text()}" for trial in exceptions),
+    ]
     if data["without_reference"]:
-        lines += ["", "Without a reference that is good enough: "
+        lines += ["", "Without a sufficient reference: "
                   + ", ".join(data["without_reference"])]  # fmt: skip
     return "\n".join(lines) + "\n"

@@ -1,4 +1,4 @@
-"""Scenes drawn afresh: families on which the rule was set, and others on which it is judged.
+"""Random scenes: families used to set the rule, and others to test it.
 
 Every family is a function of a random generator and gives a scene dictionary and the end of its run
 (s).  Lengths in m, masses in kg, angles in rad.
@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 Scene = dict[str, Any]
-Drawn = tuple[Scene, float]
-Family = Callable[[np.random.Generator], Drawn]
+Sample = tuple[Scene, float]
+Family = Callable[[np.random.Generator], Sample]
 
 _Z = [0.0, 0.0, 1.0]
 
@@ -35,10 +35,10 @@ def _unit(rng: np.random.Generator) -> list[float]:
 
 def _rod(name: str, length: float, mass: float) -> Scene:
     """A uniform rod along x with a little thickness."""
-    across = mass * length**2 / 12
+    inertia_t = mass * length**2 / 12
     return {
         "name": name, "mass": mass, "center_of_mass": [length / 2, 0.0, 0.0],
-        "inertia": [0.02 * across, across, across], "ends": {"tip": [length, 0.0, 0.0]},
+        "inertia": [0.02 * inertia_t, inertia_t, inertia_t], "ends": {"tip": [length, 0.0, 0.0]},
     }  # fmt: skip
 
 
@@ -71,9 +71,14 @@ def _tree(rng: np.random.Generator, count: int, kinds: list[str], laws: bool) ->
     bodies = [_lump(rng, f"body{i}") for i in range(count)]
     hinges = []
     for i in range(count):
-        on = f"body{rng.integers(i)}.{rng.choice(['a', 'b'])}" if i else "ground"
+        inboard = f"body{rng.integers(i)}.{rng.choice(['a', 'b'])}" if i else "ground"
         kind = str(rng.choice(kinds))
-        hinge: Scene = {"name": f"hinge{i}", "type": kind, "inboard": on, "outboard": f"body{i}"}
+        hinge: Scene = {
+            "name": f"hinge{i}",
+            "type": kind,
+            "inboard": inboard,
+            "outboard": f"body{i}",
+        }
         if kind == "ball":
             hinge["initial"] = _ball_start(rng, 2.0)
         elif kind == "pin":
@@ -101,8 +106,8 @@ def _row(
     for i in range(count):
         size = (float(rng.uniform(0.4, 1.2)), _log(rng, -0.7, 0.5)) if mass else (1.0, 1.0)
         bodies.append(_rod(f"rod{i}", *size))
-        on = f"rod{i - 1}.tip" if i else "ground"
-        hinges.append({"name": f"hinge{i}", "inboard": on, "outboard": f"rod{i}", **hinge(i)})
+        inboard = f"rod{i - 1}.tip" if i else "ground"
+        hinges.append({"name": f"hinge{i}", "inboard": inboard, "outboard": f"rod{i}", **hinge(i)})
     return _scene(bodies, hinges, [0.0, -9.81, 0.0])
 
 
@@ -119,13 +124,13 @@ def _beam(name: str, length: float, density: float, ei: float, **more: Any) -> S
 # --- on which the rule was set --------------------------------------------------------------------
 
 
-def rigid_trees(rng: np.random.Generator) -> Drawn:
+def rigid_trees(rng: np.random.Generator) -> Sample:
     """Pins and balls, half of them with springs and dampers."""
     laws = bool(rng.random() < 0.5)
     return _tree(rng, int(rng.integers(2, 6)), ["pin", "ball"], laws), float(rng.uniform(1, 3))
 
 
-def planar_chains(rng: np.random.Generator) -> Drawn:
+def planar_chains(rng: np.random.Generator) -> Sample:
     """Pendulum chains in a plane, let go at any angle."""
 
     def pin(_: int) -> Scene:
@@ -134,7 +139,7 @@ def planar_chains(rng: np.random.Generator) -> Drawn:
     return _row(rng, int(rng.integers(2, 6)), pin), float(rng.uniform(1.5, 4))
 
 
-def bushed_rows(rng: np.random.Generator) -> Drawn:
+def bushing_rows(rng: np.random.Generator) -> Sample:
     """Rods on stiff bushings, slack at first."""
     k, zeta = _log(rng, 4, 8), float(rng.choice([0.0, 0.01, 0.1, 1.0]))
     c = 2 * zeta * math.sqrt(k)
@@ -142,7 +147,7 @@ def bushed_rows(rng: np.random.Generator) -> Drawn:
     return _row(rng, int(rng.integers(2, 9)), lambda _: {"type": "planar", "law": law}, False), 1.0
 
 
-def spun_beams(rng: np.random.Generator) -> Drawn:
+def spinning_beams(rng: np.random.Generator) -> Sample:
     """A beam in a hub that a drive or a torque turns ever faster."""
     beam = _beam(
         "blade", 10.0, 1.2, _log(rng, 4, 5), modes={"y": int(rng.integers(1, 5))}, stiffening=True,
@@ -158,7 +163,7 @@ def spun_beams(rng: np.random.Generator) -> Drawn:
     return {"schema_version": 1, "gravity": [0.0] * 3, "beam": [beam], "hinge": [hinge]}, t_end
 
 
-def jerked_beams(rng: np.random.Generator) -> Drawn:
+def jerked_beams(rng: np.random.Generator) -> Sample:
     """A beam in a hub, a load on it or not, that a torque turns from one moment to the next."""
     beam = _beam(
         "boom", float(rng.uniform(1, 4)), float(rng.uniform(0.5, 3)), _log(rng, 1.5, 4.5),
@@ -178,7 +183,7 @@ def jerked_beams(rng: np.random.Generator) -> Drawn:
     return _scene(bodies, hinges, [0.0] * 3, beam=[beam]), float(rng.uniform(0.5, 3))
 
 
-def beam_arms(rng: np.random.Generator) -> Drawn:
+def beam_arms(rng: np.random.Generator) -> Sample:
     """A rigid link, a beam on its tip, and a load that the beam carries."""
     length = float(rng.uniform(0.5, 1.5))
     beam = _beam(
@@ -197,7 +202,7 @@ def beam_arms(rng: np.random.Generator) -> Drawn:
     return _scene(bodies, hinges, [0.0, -9.81, 0.0], beam=[beam]), float(rng.uniform(1, 2))
 
 
-def driven_arms(rng: np.random.Generator) -> Drawn:
+def driven_arms(rng: np.random.Generator) -> Sample:
     """Three links, the first one driven, dampers in the others."""
     a, w = float(rng.uniform(0.2, 1.0)), float(rng.uniform(1, 8))
 
@@ -210,22 +215,22 @@ def driven_arms(rng: np.random.Generator) -> Drawn:
     return _row(rng, 3, pin), float(rng.uniform(5, 15))
 
 
-def rubbing_rotors(rng: np.random.Generator) -> Drawn:
+def friction_rotors(rng: np.random.Generator) -> Sample:
     """A rotor kept turning by a torque, with friction, and a pendulum on its rim."""
-    f = float(rng.uniform(0.2, 2.0))
-    friction = {"coulomb": f, "regularisation_velocity": _log(rng, -2, -1)}
+    family = float(rng.uniform(0.2, 2.0))
+    friction = {"coulomb": family, "regularisation_velocity": _log(rng, -2, -1)}
 
     def pin(i: int) -> Scene:
         if not i:
             start = {"q": [0.0], "u": [float(rng.uniform(6, 12))]}
-            law = {"friction": friction, "effort": f + 1.0}
+            law = {"friction": friction, "effort": family + 1.0}
             return {"type": "pin", "axis": _Z, "law": law, "initial": start}
         return {"type": "pin", "axis": _Z, "law": {"damping": 0.05}}
 
     return {**_row(rng, 2, pin), "gravity": [0.0, 0.0, -9.81]}, float(rng.uniform(5, 12))
 
 
-def stopped_arms(rng: np.random.Generator) -> Drawn:
+def stopped_arms(rng: np.random.Generator) -> Sample:
     """Two links that fall against stops of the second hinge."""
     stop = {"lower": -0.8, "upper": 0.8, "stiffness": _log(rng, 3, 5), "damping": _log(rng, 0, 1)}
 
@@ -240,14 +245,14 @@ def stopped_arms(rng: np.random.Generator) -> Drawn:
 # --- on which it is judged ------------------------------------------------------------------------
 
 
-def mixed_trees(rng: np.random.Generator) -> Drawn:
+def mixed_trees(rng: np.random.Generator) -> Sample:
     """All kinds of hinges, with and without laws."""
     kinds = ["pin", "ball", "universal", "cylindrical", "prismatic"]
     laws = bool(rng.random() < 0.6)
     return _tree(rng, int(rng.integers(3, 8)), kinds, laws), float(rng.uniform(0.8, 2))
 
 
-def spatial_chains(rng: np.random.Generator) -> Drawn:
+def spatial_chains(rng: np.random.Generator) -> Sample:
     """Chains of rods on balls and on pins about any axis."""
 
     def hinge(_: int) -> Scene:
@@ -258,7 +263,7 @@ def spatial_chains(rng: np.random.Generator) -> Drawn:
     return _row(rng, int(rng.integers(2, 5)), hinge), float(rng.uniform(1, 3))
 
 
-def sprung_chains(rng: np.random.Generator) -> Drawn:
+def spring_chains(rng: np.random.Generator) -> Sample:
     """Links on stiff torsion springs between free ones, damped or not."""
     zeta = float(rng.choice([0.0, 0.02, 0.3]))
 
@@ -270,7 +275,7 @@ def sprung_chains(rng: np.random.Generator) -> Drawn:
     return _row(rng, int(rng.integers(3, 8)), pin), float(rng.uniform(0.5, 1.5))
 
 
-def falling_beams(rng: np.random.Generator) -> Drawn:
+def falling_beams(rng: np.random.Generator) -> Sample:
     """Beams on a pin, in a chord or a tangent frame, that fall."""
     chord = rng.random() < 0.5
     frame = {"frame": "chord", "basis": "simply-supported"} if chord else {"frame": "tangent"}
@@ -287,18 +292,18 @@ def falling_beams(rng: np.random.Generator) -> Drawn:
     return scene, float(rng.uniform(0.6, 1.5))
 
 
-def flexible_trees(rng: np.random.Generator) -> Drawn:
+def flexible_trees(rng: np.random.Generator) -> Sample:
     """One or two beams with other bodies between and behind them."""
     count = int(rng.integers(1, 3))
-    beams, bodies, hinges, on = [], [], [], "ground"
+    beams, bodies, hinges, inboard = [], [], [], "ground"
     for i in range(count):
         for name in (f"beam{i}", f"rod{i}"):
             hinges.append({
-                "name": f"to_{name}", "type": "pin", "axis": _Z, "inboard": on, "outboard": name,
-                "initial": {"q": [float(rng.uniform(-0.8, 0.8))]},
+                "name": f"to_{name}", "type": "pin", "axis": _Z, "inboard": inboard,
+                "outboard": name, "initial": {"q": [float(rng.uniform(-0.8, 0.8))]},
                 "law": {"damping": float(rng.choice([0.0, 0.1]))},
             })  # fmt: skip
-            on = f"{name}.tip"
+            inboard = f"{name}.tip"
         length = float(rng.uniform(0.5, 1.2))
         beams.append(_beam(
             f"beam{i}", length, float(rng.uniform(0.3, 1)), _log(rng, 0.7, 3.5),
@@ -308,7 +313,7 @@ def flexible_trees(rng: np.random.Generator) -> Drawn:
     return _scene(bodies, hinges, [0.0, -9.81, 0.0], beam=beams), float(rng.uniform(0.5, 1.5))
 
 
-def shaken_pendulums(rng: np.random.Generator) -> Drawn:
+def base_excited_pendulums(rng: np.random.Generator) -> Sample:
     """A carriage that a drive moves to and fro, with pendulums below it."""
     a, w = float(rng.uniform(0.05, 0.3)), float(rng.uniform(2, 15))
 
@@ -322,17 +327,17 @@ def shaken_pendulums(rng: np.random.Generator) -> Drawn:
     return _row(rng, int(rng.integers(2, 5)), hinge), float(rng.uniform(3, 10))
 
 
-def rubbing_slides(rng: np.random.Generator) -> Drawn:
+def friction_slides(rng: np.random.Generator) -> Sample:
     """A slide pulled along a rail that rubs, with Stribeck's fall, and a load swinging on it."""
-    f = float(rng.uniform(1, 4))
+    family = float(rng.uniform(1, 4))
     friction = {
-        "coulomb": f, "static": 1.3 * f, "stribeck_velocity": 0.3,
+        "coulomb": family, "static": 1.3 * family, "stribeck_velocity": 0.3,
         "regularisation_velocity": _log(rng, -2, -1),
     }  # fmt: skip
 
     def hinge(i: int) -> Scene:
         if not i:
-            law = {"friction": friction, "effort": 1.5 * f + 2.0}
+            law = {"friction": friction, "effort": 1.5 * family + 2.0}
             start = {"q": [0.0], "u": [float(rng.uniform(3, 6))]}
             return {"type": "prismatic", "axis": [1.0, 0.0, 0.0], "law": law, "initial": start}
         start = {"q": [-math.pi / 2 + float(rng.uniform(-0.4, 0.4))]}
@@ -341,7 +346,7 @@ def rubbing_slides(rng: np.random.Generator) -> Drawn:
     return _row(rng, 2, hinge), float(rng.uniform(5, 15))
 
 
-def bouncing_weights(rng: np.random.Generator) -> Drawn:
+def bouncing_weights(rng: np.random.Generator) -> Sample:
     """A weight that falls on a stop and bounces, a pendulum on it."""
     stop = {"lower": 0.0, "stiffness": _log(rng, 3, 5.5), "damping": float(rng.uniform(0, 5))}
 
@@ -355,26 +360,26 @@ def bouncing_weights(rng: np.random.Generator) -> Drawn:
     return _row(rng, 2, hinge), float(rng.uniform(1, 3))
 
 
-TUNING: dict[str, Family] = {
-    f.__name__: f
-    for f in (
-        rigid_trees, planar_chains, bushed_rows, spun_beams, beam_arms, driven_arms,
-        rubbing_rotors, stopped_arms, jerked_beams,
+TUNING_FAMILIES: dict[str, Family] = {
+    family.__name__: family
+    for family in (
+        rigid_trees, planar_chains, bushing_rows, spinning_beams, beam_arms, driven_arms,
+        friction_rotors, stopped_arms, jerked_beams,
     )
 }  # fmt: skip
-JUDGED: dict[str, Family] = {
-    f.__name__: f
-    for f in (
-        mixed_trees, spatial_chains, sprung_chains, flexible_trees, shaken_pendulums,
-        rubbing_slides, bouncing_weights, falling_beams,
+TEST_FAMILIES: dict[str, Family] = {
+    family.__name__: family
+    for family in (
+        mixed_trees, spatial_chains, spring_chains, flexible_trees, base_excited_pendulums,
+        friction_slides, bouncing_weights, falling_beams,
     )
 }  # fmt: skip
 
 
-def draw(families: dict[str, Family], each: int, seed: int) -> dict[str, Drawn]:
+def draw_scenes(families: dict[str, Family], each: int, seed: int) -> dict[str, Sample]:
     """`each` scenes of every family, by name; the same ones for the same seed."""
-    found = {}
+    values = {}
     for place, (name, family) in enumerate(families.items()):
         for i in range(each):
-            found[f"{name}{i}"] = family(np.random.default_rng([seed, place, i]))
-    return found
+            values[f"{name}{i}"] = family(np.random.default_rng([seed, place, i]))
+    return values

@@ -1,9 +1,9 @@
-"""How often `simulate(error=...)` says that an error is met which is not: on unseen scenes.
+"""How often `simulate(error=...)` wrongly reports that a target is met, on further scenes.
 
     python -m benchmarks.error_control.survey [--each N] [--seed N]
 
-Every scene is asked for several errors and compared with a much tighter run, which a tighter run of
-another method confirms.  What it costs is not looked at.
+Each scene runs with several target errors and is compared with a much tighter run, which a run of
+another method confirms.
 """
 
 from __future__ import annotations
@@ -13,76 +13,82 @@ from dataclasses import dataclass
 
 import mstmm
 
-from .cheapest_setting import Reference, reference, timed
-from .scenes import draw
-from .unseen_scenes import UNSEEN
+from .cheapest_setting import Reference, compute_reference, run_timed
+from .scenes import draw_scenes
+from .unseen_scenes import UNSEEN_FAMILIES
 
-#: Errors that are asked for, and how far one that is met may be above what was asked.
-ASKED, BEARABLE = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8), 1.5
+#: Target errors, and the tolerated ratio of error and target.
+TARGET_ERRORS, TOLERATED_FACTOR = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8), 1.5
 
-#: A reference that is off by more than this part of what was asked for judges nothing.
-_GOOD = 0.1
+#: Largest error of a reference relative to the target.
+_MAX_REFERENCE_ERROR_RATIO = 0.1
 
 
 @dataclass
 class Count:
-    """What the errors that were asked for became."""
+    """Counts of requests and outcomes."""
 
-    asked: int = 0
-    met: int = 0
-    kept: int = 0
+    requests: int = 0
+    reported_met: int = 0
+    within_factor: int = 0
     runs: int = 0
     cpu_s: float = 0.0
 
     def __str__(self) -> str:
-        share = 100.0 * self.kept / max(self.met, 1)
+        share = 100.0 * self.within_factor / max(self.reported_met, 1)
         return (
-            f"{self.asked} asked, {self.met} met, {self.kept} of them within {BEARABLE:g} times "
-            f"({share:.1f} %), {self.runs} runs, {self.cpu_s:.1f} s"
+            f"{self.requests} requests, {self.reported_met} met, {self.within_factor} of them "
+            f"within {TOLERATED_FACTOR:g} times the target ({share:.1f} %), "
+            f"{self.runs} runs, {self.cpu_s:.1f} s"
         )
 
 
 def main() -> None:
-    """Print every miss, and the counts over all."""
+    """Print all misses and the counts."""
     parser = ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--each", type=int, default=5, help="scenes of each of twelve families")
     parser.add_argument("--seed", type=int, default=39)
     parser.add_argument("--only", default="", help="names of families, separated by commas")
     options = parser.parse_args()
-    wanted = {n: f for n, f in UNSEEN.items() if not options.only or n in options.only.split(",")}
+    families = {
+        key: family
+        for key, family in UNSEEN_FAMILIES.items()
+        if not options.only or key in options.only.split(",")
+    }
     count = Count()
-    for name, (tables, t_end) in draw(wanted, options.each, options.seed).items():
+    for name, (tables, t_end) in draw_scenes(families, options.each, options.seed).items():
         model = mstmm.compile(mstmm.Scene(**tables), engine="looped")
-        truth = reference(model, t_end)
-        if truth is None:
+        reference = compute_reference(model, t_end)
+        if reference is None:
             print(f"{name}: no reference", flush=True)
             continue
-        for asked in ASKED:
-            if truth.error <= _GOOD * asked:
-                judge(name, model, t_end, truth, asked, count)
+        for target in TARGET_ERRORS:
+            if reference.error <= _MAX_REFERENCE_ERROR_RATIO * target:
+                check_target_error(name, model, t_end, reference, target, count)
     print(count)
 
 
-def judge(
-    name: str, model: mstmm.Model, t_end: float, truth: Reference, asked: float, count: Count
+def check_target_error(
+    name: str, model: mstmm.Model, t_end: float, reference: Reference, target: float, count: Count
 ) -> None:
-    """Ask a scene for an error and count; print what is not met or not kept."""
-    result, seconds = timed(model, t_end, error=asked)
-    known = result.achieved_error
-    assert known is not None
-    count.asked += 1
-    count.runs += len(known.runs)
+    """Run a scene with a target error and count; print failures."""
+    result, seconds = run_timed(model, t_end, error=target)
+    achieved = result.achieved_error
+    assert achieved is not None
+    count.requests += 1
+    count.runs += len(achieved.runs)
     count.cpu_s += seconds
-    if not known.is_met:
-        print(f"{name}: asked {asked:.0e}, not met: {known.reason}", flush=True)
+    if not achieved.is_met:
+        print(f"{name}: target {target:.0e}, not met: {achieved.reason}", flush=True)
         return
-    error = float(truth.measure.distance(truth.numbers, result.q).max())
-    count.met += 1
-    count.kept += error <= BEARABLE * asked
-    if error > BEARABLE * asked:
-        tried = ", ".join(f"{one.method} {one.rtol:.1e}" for one in known.runs)
+    error = float(reference.measure.distance(reference.numbers, result.q).max())
+    count.reported_met += 1
+    count.within_factor += error <= TOLERATED_FACTOR * target
+    if error > TOLERATED_FACTOR * target:
+        runs = ", ".join(f"{run.method} {run.rtol:.1e}" for run in achieved.runs)
         print(
-            f"{name}: asked {asked:.0e}, estimate {known.estimate:.1e}, true {error:.1e}; {tried}"
+            f"{name}: target {target:.0e}, estimate {achieved.estimate:.1e}, true {error:.1e}; "
+            f"{runs}"
         )
 
 

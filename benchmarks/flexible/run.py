@@ -1,18 +1,17 @@
-"""Flexible bodies beside Exudyn's ANCF cable: a beam that is spun up, a chain of 100 strips.
+"""Flexible bodies compared with Exudyn's ANCF cable: spin-up of a beam, chain of 100 strips.
 
     python benchmarks/flexible/run.py [--quick] [--plot]
 
-Spin-up (20 s): a setting is good enough if the largest deflection of the tip is within 2e-3 m of
--0.57375 m, and found within 0.06 s of 6.762 s (so that no coarse run passes by accident).  Chain
-(3 s): good enough if the tip stays within 2e-3 m of a converged run of the same tool, at 301 times.
-Every tool tries a grid of settings, each watched once; the cheapest ones that are good enough are
-then timed in alternating rounds, nothing watched.  CPU time of one whole call of `simulate` or
-`SolveDynamic`, everything set up; C code of mstmm's scenes is compiled before and kept.
+Spin-up (20 s): a setting is accurate if the largest deflection of the tip is within 2e-3 m of
+-0.57375 m, at a time within 0.06 s of 6.762 s.  Chain (3 s): accurate if the tip stays within
+2e-3 m of a converged run of the same program, at 301 times.  Each program tries a grid of settings
+once; the cheapest accurate ones are then timed in alternating rounds without recording.  CPU time
+of one whole call of `simulate` or `SolveDynamic` without set-up; C code of mstmm's scenes is
+compiled beforehand.
 """
 
 from __future__ import annotations
 
-import json
 import sys
 from pathlib import Path
 from typing import Any
@@ -22,78 +21,79 @@ import numpy as np
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
 
-import contestants  # noqa: E402
+import programs  # noqa: E402
 from common import measure  # noqa: E402
 
-ASKED, AT = 2e-3, 0.06  # m, s
-RATIO = 0.02
+MAX_ERROR, MAX_TIME_ERROR = 2e-3, 0.06  # m, s
+TARGET_RATIO = 0.02
 FINALISTS = 5
 
 
-def measured(name: str, quick: bool, rounds: int) -> dict[str, Any]:
-    """Every setting once, the cheapest good ones in rounds."""
-    tools = contestants.SCENES[name](quick)
+def measure_scene(name: str, quick: bool, rounds: int) -> dict[str, Any]:
+    """Evaluate each setting once, then time the cheapest accurate ones in rounds."""
+    settings_by_tool = programs.SCENES[name](quick)
     settings: dict[str, dict[str, Any]] = {}
-    finalists: dict[str, contestants.Setting] = {}
-    for tool, found in tools.items():
+    finalists: dict[str, programs.Setting] = {}
+    for tool, settings_of_tool in settings_by_tool.items():
         settings[tool] = {}
-        for label, setting in found.items():
-            settings[tool][label] = tried(setting)
+        for label, setting in settings_of_tool.items():
+            settings[tool][label] = evaluate_setting(setting)
             print(name, tool, label, settings[tool][label], flush=True)
-        good = [k for k, v in settings[tool].items() if enough(v)]
-        for label in sorted(good, key=lambda k: settings[tool][k]["watched_cpu_ms"])[:FINALISTS]:
-            finalists[f"{tool}|{label}"] = found[label]
-    timed = {key: setting.time for key, setting in finalists.items()}
-    for key, values in measure.rounds(timed, rounds).items():
+        accurate = [k for k, value in settings[tool].items() if is_accurate(value)]
+        for label in sorted(accurate, key=lambda k: settings[tool][k]["first_cpu_ms"])[:FINALISTS]:
+            finalists[f"{tool}|{label}"] = settings_of_tool[label]
+    timers = {key: setting.run_time for key, setting in finalists.items()}
+    for key, values in measure.sample_rounds(timers, rounds).items():
         tool, _, label = key.partition("|")
-        settings[tool][label]["cpu_ms"] = [round(1e3 * v, 5) for v in values]
+        settings[tool][label]["cpu_ms"] = [round(1e3 * value, 5) for value in values]
         print(name, key, f"{1e3 * min(values):.4g} ms", flush=True)
-    return {"scene": name, "asked_m": ASKED, "about": contestants.ABOUT[name], "tools": settings}
+    return {"scene": name, "target_error_m": MAX_ERROR,
+            "description": programs.DESCRIPTIONS[name], "tools": settings}  # fmt: skip
 
 
-def tried(setting: contestants.Setting) -> dict[str, Any]:
-    """Error and CPU time of one watched run, or how it failed."""
+def evaluate_setting(setting: programs.Setting) -> dict[str, Any]:
+    """Error and CPU time of one run, or why it failed."""
     try:
-        error, when, seconds = setting.watch()
-    except Exception as failure:  # one that gives up is a result too
+        error, time_error, seconds = setting.evaluate()
+    except Exception as failure:  # a failed run is a result too
         return {"failure": (str(failure).strip().splitlines() or ["failed"])[0][:120]}
-    found = {"error_m": float(error), "watched_cpu_ms": round(1e3 * seconds, 4)}
-    return found if when is None else {**found, "late_s": float(when)}
+    point = {"error_m": float(error), "first_cpu_ms": round(1e3 * seconds, 4)}
+    return point if time_error is None else {**point, "time_error_s": float(time_error)}
 
 
-def enough(point: dict[str, Any]) -> bool:
-    """True for a run that is as accurate as asked."""
-    if not point.get("error_m", np.inf) <= ASKED:
+def is_accurate(point: dict[str, Any]) -> bool:
+    """Whether a run meets the error limits."""
+    if not point.get("error_m", np.inf) <= MAX_ERROR:
         return False
-    return abs(point.get("late_s", 0.0)) <= AT
+    return abs(point.get("time_error_s", 0.0)) <= MAX_TIME_ERROR
 
 
 def cheapest(points: dict[str, Any]) -> tuple[str, float] | None:
-    """Setting and CPU ms of the cheapest one that was timed."""
-    found = [(min(p["cpu_ms"]), label) for label, p in points.items() if p.get("cpu_ms")]
-    return (min(found)[1], min(found)[0]) if found else None
+    """Setting and CPU ms of the cheapest timed point."""
+    timed = [(min(p["cpu_ms"]), label) for label, p in points.items() if p.get("cpu_ms")]
+    return (min(timed)[1], min(timed)[0]) if timed else None
 
 
-def ratio(result: dict[str, Any], own: str = "mstmm") -> float | None:
+def ratio(result: dict[str, Any], prefix: str = "mstmm") -> float | None:
     """CPU time of mstmm over that of Exudyn."""
-    ours = [cheapest(p) for tool, p in result["tools"].items() if tool.startswith(own)]
-    times = [found[1] for found in ours if found]
-    other = cheapest(result["tools"]["Exudyn"])
-    return min(times) / other[1] if times and other else None
+    mstmm_best = [cheapest(p) for tool, p in result["tools"].items() if tool.startswith(prefix)]
+    times = [best[1] for best in mstmm_best if best]
+    exudyn_best = cheapest(result["tools"]["Exudyn"])
+    return min(times) / exudyn_best[1] if times and exudyn_best else None
 
 
 def table(results: list[dict[str, Any]]) -> str:
-    """Markdown: the cheapest good setting of every tool."""
+    """Markdown: the cheapest accurate setting of each program."""
     lines = ["| scene | tool | setting | error, m | CPU ms | of Exudyn's |", "|---" * 6 + "|"]
     for result in results:
-        other = cheapest(result["tools"]["Exudyn"])
+        exudyn_best = cheapest(result["tools"]["Exudyn"])
         for tool, points in result["tools"].items():
-            found = cheapest(points)
-            if found is None:
-                lines.append(f"| {result['scene']} | {tool} | none good enough | | | |")
+            best = cheapest(points)
+            if best is None:
+                lines.append(f"| {result['scene']} | {tool} | none is accurate | | | |")
                 continue
-            label, value = found
-            share = f"{value / other[1]:.4f}" if other else ""
+            label, value = best
+            share = f"{value / exudyn_best[1]:.4f}" if exudyn_best else ""
             error = f"{points[label]['error_m']:.1e}"
             lines.append(
                 f"| {result['scene']} | {tool} | {label} | {error} | {value:.4g} | {share} |"
@@ -103,24 +103,19 @@ def table(results: list[dict[str, Any]]) -> str:
 
 def main() -> None:
     """Measure, print the table, draw."""
-    parser = measure.options(str(__doc__).splitlines()[0], HERE)
+    parser = measure.option_parser(str(__doc__).splitlines()[0], HERE)
     parser.add_argument("--rounds", type=int, default=9)
-    parser.add_argument("--scene", choices=list(contestants.SCENES), action="append")
     options = parser.parse_args()
     if not options.plot:
-        kept = {}
-        if options.scene and options.json.exists():
-            kept = {r["scene"]: r for r in json.loads(options.json.read_text())["results"]}
-        for name in options.scene or contestants.SCENES:
-            kept[name] = measured(name, options.quick, 2 if options.quick else options.rounds)
-        measure.save(options.json, list(kept.values()), unit="CPU ms of one run", asked_ratio=RATIO)
-    record = json.loads(options.json.read_text())
-    text = table(record["results"])
-    print(text)
-    options.json.with_suffix(".md").write_text(text + "\n")
+        rounds = 2 if options.quick else options.rounds
+        results = [measure_scene(name, options.quick, rounds) for name in programs.SCENES]
+        measure.save_record(
+            options.json, results, unit="CPU ms of one run", target_ratio=TARGET_RATIO
+        )
+    record = measure.write_table(options.json, table)
     from picture import draw
 
-    draw(record, enough, options.picture)
+    draw(record, is_accurate, options.picture)
 
 
 if __name__ == "__main__":

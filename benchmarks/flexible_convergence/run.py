@@ -2,7 +2,7 @@
 
     python benchmarks/flexible_convergence/run.py [--plot]
 
-Largest distance of the tip from chains of rigid segments (extrapolated; the tests keep them) and
+Largest distance of the tip from chains of rigid segments (extrapolated; stored in the tests) and
 relative error of frequencies against finite elements, for every frame and basis.
 """
 
@@ -46,17 +46,21 @@ LINES: dict[str, dict[str, tuple[str, dict[str, Any]]]] = {
         "static + fixed-interface, linear": ("static+fixed-interface", {"stiffening": False}),
     },
 }
-MAKE = {"pendulum": motions.pendulum, "two pinned": motions.two_pinned, "welded": motions.welded}
+BUILDERS = {
+    "pendulum": motions.pendulum,
+    "two pinned": motions.two_pinned,
+    "welded": motions.welded,
+}
 COUNTS = {"pendulum": range(1, 9), "two pinned": range(1, 7), "welded": range(1, 7)}
 
 
 def motion_errors() -> dict[str, Any]:
     """Largest tip error in m over the motion, by scene, line and number of shapes."""
-    out: dict[str, Any] = {}
+    results: dict[str, Any] = {}
     for case, lines in LINES.items():
-        rigid = MAKE[case](next(iter(lines.values()))[0], 1, model="rigid")
+        rigid = BUILDERS[case](next(iter(lines.values()))[0], 1, model="rigid")
         correction = motions.CONVERGED[case]["correction"]
-        out[case] = {
+        results[case] = {
             "reference_correction": correction,
             "rigid": motions.tip_error(rigid, case),
             "lines": {},
@@ -66,57 +70,59 @@ def motion_errors() -> dict[str, Any]:
             for n in COUNTS[case]:
                 if "static" in line and n < 2:
                     continue
-                errors[n] = motions.tip_error(MAKE[case](choice, n, **keys), case)
+                errors[n] = motions.tip_error(BUILDERS[case](choice, n, **keys), case)
                 print(f"{case:12} {line:34} n = {n}  {errors[n]:.2e} m", flush=True)
-            out[case]["lines"][line] = errors
-    return out
+            results[case]["lines"][line] = errors
+    return results
 
 
 def spin_up_errors() -> dict[str, Any]:
     """Error of the largest tip deflection over the length, by beam and form."""
-    out: dict[str, Any] = {}
+    results: dict[str, Any] = {}
     for case, (size, *_) in motions.SPINNING.items():
-        out[case] = {}
+        results[case] = {}
         for line, keys in (("invariant form", {}), ("quadrature", {"quadrature": True})):
             errors = {}
             for n in range(1, 6):
-                _, across = motions.deflection(motions.spinning(case, n, **keys))
-                largest = float(across[:740].min())
+                _, deflection = motions.deflection(motions.spinning(case, n, **keys))
+                largest = float(deflection[:740].min())
                 errors[n] = {
                     "deflection": largest,
                     "error": abs(largest - motions.CONVERGED[case]["deflection"]) / size[0],
                 }
                 print(f"{case:12} {line:34} n = {n}  {largest:.5f} m", flush=True)
-            out[case][line] = errors
-    return out
+            results[case][line] = errors
+    return results
 
 
 def frequency_errors() -> dict[str, Any]:
     """Relative errors of the first three frequencies of an L-frame, and of the first flap and lag
     frequency of a beam that turns with 12 sqrt(EI / (rho A L^4))."""
-    frame, exact = {}, fe.l_frame(0.6, 0.5, 50.0, 3)
+    l_frame, exact = {}, fe.l_frame(0.6, 0.5, 50.0, 3)
     for basis in ("clamped-free", "simply-supported", "static+fixed-interface"):
         errors = {}
         for n in (2, 3, 4, 6, 8):
-            found = scenes.frequencies(*scenes.motion_near(welded(basis, n)), 3)
-            errors[n] = np.abs(found / exact - 1).tolist()
-        frame[basis] = errors
+            frequencies = scenes.frequencies(
+                *scenes.motion_near(weightless_welded_beams(basis, n)), 3
+            )
+            errors[n] = np.abs(frequencies / exact - 1).tolist()
+        l_frame[basis] = errors
     turning = {}
     for word, lag in (("z", False), ("y", True)):
         reference = fe.rotating(0, 12, lag, 1)[0]
         errors = {}
         for n in range(1, 13):
             data = scenes.turning_beam(12.0, modes={word: n})
-            found = scenes.frequencies(*scenes.motion_near(data), 1)[0]
-            errors[n] = abs(found / reference - 1)
+            frequencies = scenes.frequencies(*scenes.motion_near(data), 1)[0]
+            errors[n] = abs(frequencies / reference - 1)
         turning["lag" if lag else "flap"] = errors
-    return {"l_frame": frame, "turning": turning}
+    return {"l_frame": l_frame, "turning": turning}
 
 
-def welded(basis: str, n: int) -> scenes.Scene:
-    """The welded beams at rest, without weight, in frames that suit the shapes."""
-    own = {"frame": "chord"} if basis == "simply-supported" else {}
-    return {**motions.welded(basis, n, **own), "gravity": [0.0, 0.0, 0.0]}
+def weightless_welded_beams(basis: str, n: int) -> scenes.Scene:
+    """The welded beams at rest, without weight, in suitable frames."""
+    frame_keys = {"frame": "chord"} if basis == "simply-supported" else {}
+    return {**motions.welded(basis, n, **frame_keys), "gravity": [0.0, 0.0, 0.0]}
 
 
 def main() -> None:

@@ -1,17 +1,15 @@
-"""The 20 slowest natural motions of chains, beside SciPy's eigsh on matrices of the same scene.
+"""The 20 lowest normal modes of chains, compared with SciPy's eigsh on matrices of the scene.
 
     python benchmarks/linear_models/modes.py [--quick]
 
-CPU time of a call, contenders in alternating rounds.  eigsh (shift and invert at 0) has two kinds
-of matrices, which are not counted: M and K in the coordinates of hinges, as `linearize` gives them,
-where M is full; and those that somebody would assemble by hand for this chain, sparse because they
-are of every body apart: displacements beside the ground, joined by stiffness, or for hinges without
-give by stiffness of 1e9 in place of them.
+CPU time of a call in alternating rounds.  eigsh (shift and invert at 0) gets two kinds of matrices,
+whose assembly is not counted: M and K in hinge coordinates as `linearize` returns them, where M is
+full; and sparse matrices of absolute displacements as written by hand for this chain, where a
+stiffness of 1e9 replaces rigid constraints.
 """
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -31,15 +29,15 @@ import mstmm  # noqa: E402
 COUNT, LENGTH, TARGET = 20, 0.1, 0.1
 OWN, FULL, SPARSE = "mstmm", "eigsh, hinges (full M)", "eigsh, every body (sparse)"
 SIZES, ROUNDS = (1000, 3000, 10_000), 4
-#: Up to so many coordinates full matrices are asked; time goes with the cube.
-MOST_FULL = 10_000
-GIVES = [1e6, 2e6, 3e6, 1e4, 2e4, 3e4]  # along x, y, z in N/m, about x, y, z in N m/rad
-PIN, HELD = 1e4, 1e9
+#: Largest number of coordinates for full matrices, whose time grows with its cube.
+MAX_FULL = 10_000
+STIFFNESSES = [1e6, 2e6, 3e6, 1e4, 2e4, 3e4]  # along x, y, z in N/m, about x, y, z in N m/rad
+PIN, CONSTRAINT_STIFFNESS = 1e4, 1e9
 
 Work = Callable[[], np.ndarray]
 
 
-def row(bodies: int, inertia: list[float], hinge: dict[str, Any]) -> mstmm.Scene:
+def rod_chain(bodies: int, inertia: list[float], hinge: dict[str, Any]) -> mstmm.Scene:
     """A chain of equal rods along x, 0.1 m and 1 kg each, without gravity."""
     rod = {"mass": 1.0, "center_of_mass": [LENGTH / 2, 0, 0], "inertia": inertia,
            "ends": {"tip": [LENGTH, 0, 0]}}  # fmt: skip
@@ -52,30 +50,36 @@ def scene(kind: str, bodies: int) -> mstmm.Scene:
     """One of the three chains."""
     if kind == "masses on springs":
         law = {"stiffness": 100.0}
-        return row(bodies, [1, 1, 1], {"type": "prismatic", "axis": [1, 0, 0], "law": law})
+        return rod_chain(bodies, [1, 1, 1], {"type": "prismatic", "axis": [1, 0, 0], "law": law})
     if kind == "rods on pins":
         law = {"stiffness": PIN}
-        return row(bodies, [1e-5, 8.5e-4, 8.5e-4], {"type": "pin", "law": law})
-    law = {"stiffness": GIVES}
-    return row(bodies, [1e-4, 8.5e-4, 8.5e-4], {"type": "elastic", "law": law})
+        return rod_chain(bodies, [1e-5, 8.5e-4, 8.5e-4], {"type": "pin", "law": law})
+    law = {"stiffness": STIFFNESSES}
+    return rod_chain(bodies, [1e-4, 8.5e-4, 8.5e-4], {"type": "elastic", "law": law})
 
 
-def assembled(kind: str, bodies: int) -> tuple[Any, Any]:
-    """Sparse K and M of a chain, each body by itself."""
+def assemble_matrices(kind: str, bodies: int) -> tuple[Any, Any]:
+    """Sparse K and M of a chain in absolute coordinates of the bodies."""
     if kind == "masses on springs":
-        own, across = np.full(bodies, 200.0), np.full(bodies - 1, -100.0)
-        own[-1] = 100.0
-        return sp.diags([own, across, across], [0, 1, -1]).tocsc(), sp.identity(bodies).tocsc()
+        diagonal, off_diagonal = np.full(bodies, 200.0), np.full(bodies - 1, -100.0)
+        diagonal[-1] = 100.0
+        return sp.diags([diagonal, off_diagonal, off_diagonal], [0, 1, -1]).tocsc(), sp.identity(
+            bodies
+        ).tocsc()
     planar = kind == "rods on pins"
-    gives = np.diag([HELD, HELD, PIN] if planar else GIVES)
+    stiffness_of_hinge = np.diag(
+        [CONSTRAINT_STIFFNESS, CONSTRAINT_STIFFNESS, PIN] if planar else STIFFNESSES
+    )
     center, tip = np.eye(6), np.eye(6)
     center[:3, 3:], tip[:3, 3:] = -_tilde(LENGTH / 2), -_tilde(LENGTH)
     mass = center.T @ np.diag([1, 1, 1, 1e-4, 8.5e-4, 8.5e-4]) @ center
-    kept = [0, 1, 5] if planar else range(6)
-    mass, tip = (matrix[np.ix_(kept, kept)] for matrix in (mass, tip))
-    beside = sp.diags([np.ones(bodies - 1)], [-1])  # how far hinges open: own motion, inboard tip's
-    opens = sp.kron(sp.identity(bodies), np.eye(len(kept))) - sp.kron(beside, tip)
-    stiffness = opens.T @ sp.kron(sp.identity(bodies), gives) @ opens
+    directions = [0, 1, 5] if planar else range(6)
+    mass, tip = (matrix[np.ix_(directions, directions)] for matrix in (mass, tip))
+    inboard_neighbour = sp.diags([np.ones(bodies - 1)], [-1])  # relative displacements of hinges
+    hinge_openings = sp.kron(sp.identity(bodies), np.eye(len(directions))) - sp.kron(
+        inboard_neighbour, tip
+    )
+    stiffness = hinge_openings.T @ sp.kron(sp.identity(bodies), stiffness_of_hinge) @ hinge_openings
     return stiffness.tocsc(), sp.kron(sp.identity(bodies), mass).tocsc()
 
 
@@ -84,61 +88,73 @@ def _tilde(x: float) -> np.ndarray:
     return np.array([[0, 0, 0], [0, 0, -x], [0, x, 0]])
 
 
-def contenders(kind: str, bodies: int) -> dict[str, Work]:
+def timed_calls(kind: str, bodies: int) -> dict[str, Work]:
     """Calls that give omega (20,) in rad/s."""
     linear = mstmm.compile(scene(kind, bodies), engine="looped").linearize(inputs=[])
 
     def by_eigsh(stiffness: Any, mass: Any) -> Work:
         return lambda: np.sqrt(np.sort(eigsh(stiffness, k=COUNT, M=mass, sigma=0.0)[0]))
 
-    found = {OWN: lambda: linear.modes(COUNT).omega, SPARSE: by_eigsh(*assembled(kind, bodies))}
-    if len(linear) <= MOST_FULL:
-        found[FULL] = by_eigsh(linear.K, linear.M)
-    return found
+    calls = {
+        OWN: lambda: linear.modes(COUNT).omega,
+        SPARSE: by_eigsh(*assemble_matrices(kind, bodies)),
+    }
+    if len(linear) <= MAX_FULL:
+        calls[FULL] = by_eigsh(linear.K, linear.M)
+    return calls
 
 
-def measured(quick: bool) -> list[dict[str, Any]]:
-    """Seconds a call, and how far frequencies lie apart."""
+def measure_all(quick: bool) -> list[dict[str, Any]]:
+    """Seconds per call, and the relative difference of frequencies."""
     results = []
-    for kind in ("masses on springs", "rods on pins", "six directions of give"):
+    for kind in ("masses on springs", "rods on pins", "six elastic directions"):
         for bodies in SIZES[:1] if quick else SIZES:
-            work = contenders(kind, bodies)
+            work = timed_calls(kind, bodies)
             omega = {name: call() for name, call in work.items()}
-            timed = {name: lambda call=call: measure.once(call) for name, call in work.items()}
-            for name, samples in measure.rounds(timed, 1 if quick else ROUNDS).items():
-                apart = measure.disagreement(omega[name], omega[OWN])
+            timers = {
+                name: lambda call=call: measure.call_time(call) for name, call in work.items()
+            }
+            for name, samples in measure.sample_rounds(timers, 1 if quick else ROUNDS).items():
+                difference = measure.relative_difference(omega[name], omega[OWN])
                 results.append(
-                    {"chain": kind, "bodies": bodies, "tool": name, "s": samples, "apart": apart}
+                    {
+                        "chain": kind,
+                        "bodies": bodies,
+                        "tool": name,
+                        "s": samples,
+                        "difference": difference,
+                    }
                 )
                 print(kind, bodies, name, f"{min(samples):.4g} s", flush=True)
     return results
 
 
 def table(results: list[dict[str, Any]]) -> str:
-    """Markdown: best of the rounds."""
-    own = {(r["chain"], r["bodies"]): min(r["s"]) for r in results if r["tool"] == OWN}
-    lines = ["| chain | bodies | tool | s | a body, us | mstmm beside it | asked | apart |",
+    """Markdown: minimum of the rounds."""
+    own_seconds = {(r["chain"], r["bodies"]): min(r["s"]) for r in results if r["tool"] == OWN}
+    lines = ["| chain | bodies | tool | s | us per body | mstmm / tool | target | difference |",
              "|---|---|---|---|---|---|---|---|"]  # fmt: skip
     for r in results:
-        s, ours = min(r["s"]), r["tool"] == OWN
-        beside = "" if ours else f"{own[r['chain'], r['bodies']] / s:.2g} | {TARGET}"
+        seconds, is_own = min(r["s"]), r["tool"] == OWN
+        comparison = (
+            "" if is_own else f"{own_seconds[r['chain'], r['bodies']] / seconds:.2g} | {TARGET}"
+        )
         lines.append(
-            f"| {r['chain']} | {r['bodies']} | {r['tool']} | {s:.4g} | {1e6 * s / r['bodies']:.3g} "
-            f"| {beside or ' | '} | {'' if ours else format(r['apart'], '.0e')} |"
+            f"| {r['chain']} | {r['bodies']} | {r['tool']} | {seconds:.4g} "
+            f"| {1e6 * seconds / r['bodies']:.3g} "
+            f"| {comparison or ' | '} | {'' if is_own else format(r['difference'], '.0e')} |"
         )
     return "\n".join(lines)
 
 
 def main() -> None:
     """Measure, print the table."""
-    parser = measure.options(str(__doc__).splitlines()[0], HERE)
+    parser = measure.option_parser(str(__doc__).splitlines()[0], HERE)
     parser.set_defaults(json=HERE / "modes.json")
     options = parser.parse_args()
     if not options.plot:
-        measure.save(options.json, measured(options.quick))
-    text = table(json.loads(options.json.read_text())["results"])
-    print(text)
-    options.json.with_suffix(".md").write_text(text + "\n")
+        measure.save_record(options.json, measure_all(options.quick))
+    measure.write_table(options.json, table)
 
 
 if __name__ == "__main__":

@@ -1,15 +1,14 @@
-"""Linear models of arms at a state, called from Python, beside Pinocchio's derivatives.
+"""Linear models of arms at a state, called from Python, compared with Pinocchio's derivatives.
 
     python benchmarks/linear_models/run.py [--quick]
 
-CPU time of a call, contenders in alternating rounds: mstmm on code compiled for the scene and on
-the looped engine, and pin.computeABADerivatives (if pin is there), which finds the same numbers.
-Building models and compiling are not counted.
+CPU time of a call in alternating rounds: mstmm on the fused and the looped engine, and
+pin.computeABADerivatives, if installed, which computes the same derivatives.  Building and
+compiling are not counted.
 """
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -31,12 +30,12 @@ TARGETS = {"linearize(q, u)": 2.0, "linearize(q, u).A": 2.0, "derivatives(q, u)"
 Work = dict[str, Callable[[], object]]
 
 
-def own(scene: scenes.Scene, q: np.ndarray, u: np.ndarray) -> tuple[Work, np.ndarray]:
-    """Our calls, and the slopes of accelerations (nu, 2 nu) by q and u that they find."""
+def own_calls(scene: scenes.Scene, q: np.ndarray, u: np.ndarray) -> tuple[Work, np.ndarray]:
+    """Calls of mstmm, and their derivatives of accelerations (nu, 2 nu) by q and u."""
     fused, looped = (
         mstmm.compile(mstmm.Scene(**scene), engine=engine) for engine in ("fused", "looped")
     )
-    for model in (fused, looped):  # the first call compiles, or looks for code
+    for model in (fused, looped):  # the first call compiles or loads code
         model.linearize(q, u)
         model.derivatives(q, u)
     work: Work = {
@@ -48,18 +47,18 @@ def own(scene: scenes.Scene, q: np.ndarray, u: np.ndarray) -> tuple[Work, np.nda
     return work, fused.linearize(q, u).A[len(u) :]
 
 
-def peer(scene: scenes.Scene, q: np.ndarray, u: np.ndarray) -> tuple[Work, np.ndarray | None]:
-    """Pinocchio's call and what it finds; nothing where pin is missing."""
+def peer_calls(scene: scenes.Scene, q: np.ndarray, u: np.ndarray) -> tuple[Work, np.ndarray | None]:
+    """Call of Pinocchio and its derivatives; nothing if pin is not installed."""
     try:
         import pinocchio as pin
     except ImportError:
         return {}, None
-    tree, model = links.links_of(scene), pin.Model()
+    tree, model = links.link_tree(scene), pin.Model()
     model.gravity.linear = tree.gravity
     for link in tree.links:
         joint = model.addJoint(
             link.parent + 1, pin.JointModelRevoluteUnaligned(link.axis),
-            pin.SE3(link.turn, link.place), link.name,
+            pin.SE3(link.orientation, link.position), link.name,
         )  # fmt: skip
         inertia = pin.Inertia(link.mass, link.center, link.inertia)
         model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
@@ -74,25 +73,30 @@ def peer(scene: scenes.Scene, q: np.ndarray, u: np.ndarray) -> tuple[Work, np.nd
     return {PEER: call}, np.hstack([data.ddq_dq, data.ddq_dv])
 
 
-def measured(quick: bool) -> list[dict[str, Any]]:
-    """Microseconds a call, and how far the slopes lie apart."""
+def measure_all(quick: bool) -> list[dict[str, Any]]:
+    """Microseconds per call, and the relative difference of the derivatives."""
     results = []
-    for name, make in SCENES.items():
-        scene = bare(make())
-        (q,), (u,) = links.states(links.links_of(scene), 1)
-        work, found = own(scene, q, u)
-        other, wanted = peer(scene, q, u)
-        apart = None if wanted is None else measure.disagreement(found, wanted)
-        timed = {one: lambda call=call: measure.once(call) for one, call in (other | work).items()}
-        for one, samples in measure.rounds(timed, 3 if quick else 40).items():
+    for name, build in SCENES.items():
+        scene = without_laws(build())
+        (q,), (u,) = links.random_states(links.link_tree(scene), 1)
+        work, slopes = own_calls(scene, q, u)
+        peer_work, peer_slopes = peer_calls(scene, q, u)
+        difference = (
+            None if peer_slopes is None else measure.relative_difference(slopes, peer_slopes)
+        )
+        timers = {
+            label: lambda call=call: measure.call_time(call)
+            for label, call in (peer_work | work).items()
+        }
+        for label, samples in measure.sample_rounds(timers, 3 if quick else 40).items():
             us = [1e6 * s for s in samples]
-            results.append({"scene": name, "call": one, "us": us, "apart": apart})
-            print(name, one, f"{min(us):.4g} us", flush=True)
+            results.append({"scene": name, "call": label, "us": us, "difference": difference})
+            print(name, label, f"{min(us):.4g} us", flush=True)
     return results
 
 
-def bare(scene: scenes.Scene) -> scenes.Scene:
-    """Without what the peer does not differentiate, but inertia of drives."""
+def without_laws(scene: scenes.Scene) -> scenes.Scene:
+    """Scene without laws except drive inertia, which Pinocchio differentiates too."""
     hinges = [
         hinge | {"law": {"inertia": hinge.get("law", {}).get("inertia", 0.0)}}
         for hinge in scene["hinge"]
@@ -101,27 +105,31 @@ def bare(scene: scenes.Scene) -> scenes.Scene:
 
 
 def table(results: list[dict[str, Any]]) -> str:
-    """Markdown: best of the rounds."""
-    lines = ["| scene | call | us | beside pin | asked | apart |", "|---|---|---|---|---|---|"]
-    best = {(r["scene"], r["call"]): min(r["us"]) for r in results}
+    """Markdown: minimum of the rounds."""
+    lines = [
+        "| scene | call | us | ratio to pin | target | difference |",
+        "|---|---|---|---|---|---|",
+    ]
+    best_us = {(r["scene"], r["call"]): min(r["us"]) for r in results}
     for r in results:
-        us, beside = min(r["us"]), best.get((r["scene"], PEER))
-        ratio = "" if beside is None else f"{us / beside:.3g}"
-        apart = "" if r["apart"] is None or r["call"] == PEER else f"{r['apart']:.1e}"
-        asked = TARGETS.get(r["call"], "")
-        lines.append(f"| {r['scene']} | {r['call']} | {us:.4g} | {ratio} | {asked} | {apart} |")
+        us, peer_us = min(r["us"]), best_us.get((r["scene"], PEER))
+        ratio = "" if peer_us is None else f"{us / peer_us:.3g}"
+        difference = (
+            "" if r["difference"] is None or r["call"] == PEER else f"{r['difference']:.1e}"
+        )
+        target = TARGETS.get(r["call"], "")
+        lines.append(
+            f"| {r['scene']} | {r['call']} | {us:.4g} | {ratio} | {target} | {difference} |"
+        )
     return "\n".join(lines)
 
 
 def main() -> None:
     """Measure, print the table."""
-    options = measure.options(str(__doc__).splitlines()[0], HERE).parse_args()
+    options = measure.option_parser(str(__doc__).splitlines()[0], HERE).parse_args()
     if not options.plot:
-        measure.save(options.json, measured(options.quick))
-    record = json.loads(options.json.read_text())
-    text = table(record["results"])
-    print(text)
-    options.json.with_suffix(".md").write_text(text + "\n")
+        measure.save_record(options.json, measure_all(options.quick))
+    measure.write_table(options.json, table)
 
 
 if __name__ == "__main__":

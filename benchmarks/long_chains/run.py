@@ -1,10 +1,10 @@
-"""Long chains: CPU time of one evaluation, memory, and who gives up where and how.
+"""Long chains: CPU time of one evaluation, memory, and failures.
 
     python benchmarks/long_chains/run.py [--quick] [--plot]
 
-Every tool gets a process of its own, 8 GiB and a limit on time; the next size is asked for only
-where the one before was mastered.  "run" is CPU time per simulated second from rest: mstmm with
-error control at 1e-6, Exudyn's sparse form in implicit steps of 1 ms.
+Each program runs in its own process with 8 GiB and a time limit; after a failure larger sizes are
+skipped.  "run" is CPU time per simulated second from rest, extrapolated: mstmm from 0.02 s with
+error control at 1e-6, Exudyn's sparse form from three implicit steps of 1 ms.
 """
 
 from __future__ import annotations
@@ -28,31 +28,31 @@ COLUMNS = {
 }  # fmt: skip
 
 
-def asked(tool: str, kind: str, bodies: int, seconds: float) -> dict[str, Any]:
-    """What a tool cost, or how it failed."""
+def run_worker(tool: str, kind: str, bodies: int, seconds: float) -> dict[str, Any]:
+    """Cost of a program, or its failure."""
     command = [sys.executable, str(HERE / "worker.py"), tool, kind, str(bodies)]
     try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=seconds)
+        process = subprocess.run(command, capture_output=True, text=True, timeout=seconds)
     except subprocess.TimeoutExpired:
         return {"failure": f"not done after {seconds:g} s"}
-    if done.returncode == 0:
-        return dict(json.loads(done.stdout.strip().splitlines()[-1]))
-    if done.returncode < 0:
-        return {"failure": f"killed by signal {-done.returncode} (8 GiB allowed)"}
-    lines = [line for line in done.stderr.strip().splitlines() if line.strip()]
-    return {"failure": (lines[-1] if lines else f"exit status {done.returncode}")[:160]}
+    if process.returncode == 0:
+        return dict(json.loads(process.stdout.strip().splitlines()[-1]))
+    if process.returncode < 0:
+        return {"failure": f"killed by signal {-process.returncode} (8 GiB allowed)"}
+    lines = [line for line in process.stderr.strip().splitlines() if line.strip()]
+    return {"failure": (lines[-1] if lines else f"exit status {process.returncode}")[:160]}
 
 
-def measured(quick: bool, seconds: float) -> list[dict[str, Any]]:
-    """Every tool on every size that it may reach."""
+def measure_tools(quick: bool, seconds: float) -> list[dict[str, Any]]:
+    """All programs on all sizes up to their first failure."""
     results = []
     for kind, sizes in SIZES.items():
         for tool in TOOLS:
             for bodies in sizes[:2] if quick else sizes:
-                found = asked(tool, kind, bodies, seconds)
-                results.append({"tool": tool, "kind": kind, "bodies": bodies, **found})
+                outcome = run_worker(tool, kind, bodies, seconds)
+                results.append({"tool": tool, "kind": kind, "bodies": bodies, **outcome})
                 print(results[-1], flush=True)
-                if "failure" in found:
+                if "failure" in outcome:
                     break
     return results
 
@@ -62,27 +62,24 @@ def table(results: list[dict[str, Any]]) -> str:
     lines = [f"| chain | bodies | tool | {' | '.join(COLUMNS.values())} |",
              "|---" * (len(COLUMNS) + 3) + "|"]  # fmt: skip
     for r in sorted(results, key=lambda r: (r["kind"] == "balls", r["bodies"])):
-        start = f"| {r['kind']} | {r['bodies']} | {r['tool']} | "
+        prefix = f"| {r['kind']} | {r['bodies']} | {r['tool']} | "
         if "failure" in r:
-            lines.append(f"{start}fails: {r['failure']} | | | |")
+            lines.append(f"{prefix}fails: {r['failure']} | | | |")
         else:
             lines.append(
-                start + " | ".join(f"{r[c]:.3g}" if c in r else "" for c in COLUMNS) + " |"
+                prefix + " | ".join(f"{r[c]:.3g}" if c in r else "" for c in COLUMNS) + " |"
             )
     return "\n".join(lines)
 
 
 def main() -> None:
     """Measure, print the table, draw."""
-    parser = measure.options(str(__doc__).splitlines()[0], HERE)
+    parser = measure.option_parser(str(__doc__).splitlines()[0], HERE)
     parser.add_argument("--seconds", type=float, default=40.0, help="limit for one tool and size")
     options = parser.parse_args()
     if not options.plot:
-        measure.save(options.json, measured(options.quick, options.seconds))
-    record = json.loads(options.json.read_text())
-    text = table(record["results"])
-    print(text)
-    options.json.with_suffix(".md").write_text(text + "\n")
+        measure.save_record(options.json, measure_tools(options.quick, options.seconds))
+    record = measure.write_table(options.json, table)
     from picture import draw
 
     draw(record, options.picture)

@@ -1,21 +1,19 @@
-"""Accelerations of mechanisms with closed loops, side by side.
+"""Accelerations of mechanisms with closed loops, compared with other programs.
 
     python benchmarks/loops/run.py [--quick]
 
-CPU time of one evaluation of many, contenders in alternating rounds: windows of four-bars in a row,
-by the number of windows, beside an iteration of Exudyn's Newton method with a new Jacobian and its
-sparse solver; Stewart's platform beside MuJoCo's equality constraints.  MuJoCo's rows yield by
-design; `apart` tells how far its accelerations are from those of the rigid platform.  Andrews'
-squeezer, run for 0.03 s to an error of its crank of 1e-6 rad, between each tool's settings around
-it: DOP853 in C around Pinocchio's constrained dynamics, Exudyn's generalized alpha.  Ours is the
-looped engine, and fused code where it says so, of one state at a time.  Windows are also measured
-by the tangent of an implicit step and one solution with it.  Building what each needs is not
-counted; peers that are not there are left out.
+CPU time of one evaluation in alternating rounds.  Rows of four-bar windows: time over the number
+of windows, compared with an iteration of Exudyn's Newton method with a new Jacobian and the sparse
+solver; also the tangent of an implicit step with one solution.  Stewart's platform: MuJoCo with
+equality constraints, which are soft; `difference` is the relative difference of accelerations from
+the rigid platform.  Andrews' squeezer, 0.03 s to a crank error of 1e-6 rad, interpolated between
+two settings: DOP853 in C around Pinocchio's constrained dynamics, Exudyn's generalised alpha.
+mstmm: looped engine, or fused where stated, one state at a time.  Set-up is not counted; programs
+that are not installed are left out.
 """
 
 from __future__ import annotations
 
-import json
 import sys
 import tomllib
 from collections.abc import Callable
@@ -33,15 +31,15 @@ import mstmm  # noqa: E402
 from mstmm.runtime.engine.tangent_matrix import TangentMatrix  # noqa: E402
 
 SIZES = (10, 50, 200, 1000)
-#: Windows whose tangents are compared, as implicit steps take them.
-FACTORED = (50, 400)
-#: Scene, peer, ratio that was asked.
-COMPARED = (
+#: Numbers of windows for the tangents of implicit steps.
+IMPLICIT_SIZES = (50, 400)
+#: Scene, program, target of the ratio.
+COMPARISONS = (
     (f"{SIZES[-1]} windows", "Exudyn", 0.05), ("platform", "MuJoCo", 0.3),
     ("Andrews to 1e-6", "Pinocchio", 0.1), ("Andrews to 1e-6", "Exudyn", 0.1),
 )  # fmt: skip
-#: Error of Andrews' crank, rad.
-ASKED = 1e-6
+#: Target error of Andrews' crank, rad.
+TARGET_ERROR = 1e-6
 PLATFORM = HERE.parents[1] / "examples" / "stewart_platform" / "scene.toml"
 
 
@@ -67,7 +65,7 @@ def windows(count: int) -> mstmm.Scene:
 
 
 def platform() -> mstmm.Scene:
-    """The platform of the examples on springs along its legs, two of them pressed."""
+    """Stewart platform of the examples with springs along the legs, two of them compressed."""
     data = tomllib.loads(PLATFORM.read_text(encoding="utf-8"))
     for k, hinge in enumerate(h for h in data["hinge"] if h["type"] == "prismatic"):
         del hinge["drive"]
@@ -79,92 +77,94 @@ def platform() -> mstmm.Scene:
 def evaluations(model: mstmm.Model, count: int) -> Callable[[], np.ndarray]:
     """Accelerations at the start, `count` times in one call."""
     q, u = model.initial_state()
-    many_q, many_u = np.tile(q, (count, 1)), np.tile(u, (count, 1))
-    return lambda: model.accelerations(many_q, many_u, threads=1)
+    q_rows, u_rows = np.tile(q, (count, 1)), np.tile(u, (count, 1))
+    return lambda: model.accelerations(q_rows, u_rows, threads=1)
 
 
-def slides(model: mstmm.Model) -> np.ndarray:
+def leg_accelerations(model: mstmm.Model) -> np.ndarray:
     """Accelerations of the six legs at the start."""
     udot = model.accelerations(*model.initial_state())
     return np.array([udot[model.coordinate_layout.hinges[f"slide{k}"].u] for k in range(6)])
 
 
-def per_evaluation(
+def evaluation_times(
     work: dict[str, Callable[[], Any]], count: int, rounds: int
 ) -> dict[str, list[float]]:
-    """Microseconds of one of `count` evaluations, by contender."""
-    timed = {name: lambda one=one: measure.once(one) for name, one in work.items()}
-    return {name: [1e6 * s / count for s in found]
-            for name, found in measure.rounds(timed, rounds).items()}  # fmt: skip
+    """Microseconds of one of `count` evaluations, by program."""
+    timers = {name: lambda call=call: measure.call_time(call) for name, call in work.items()}
+    return {name: [1e6 * s / count for s in samples]
+            for name, samples in measure.sample_rounds(timers, rounds).items()}  # fmt: skip
 
 
-def measured(quick: bool) -> list[dict[str, Any]]:
+def measure_all(quick: bool) -> list[dict[str, Any]]:
     """Rows of the table."""
     rounds, results = (2, []) if quick else (15, [])
     models = {count: mstmm.compile(windows(count), engine="looped") for count in SIZES}
     calls = {count: max(4, 8000 // count) for count in SIZES}
     work = {str(count): evaluations(model, calls[count]) for count, model in models.items()}
-    times, beside = dict[str, list[float]](), list[float]()
+    times, exudyn_times = dict[str, list[float]](), list[float]()
     for _ in range(max(2, rounds // 3)):
-        for name, found in per_evaluation(work, 1, rounds).items():
-            times.setdefault(name, []).extend(us / calls[int(name)] for us in found)
-        beside += iteration_beside()
-    for name, found in times.items():
-        results.append(row_of(int(name), "mstmm", found))
-    results += [row_of(SIZES[-1], "Exudyn", beside)] if beside else []
-    return results + tangents(rounds) + platform_beside(rounds) + squeezer_beside(rounds)
+        for name, samples in evaluation_times(work, 1, rounds).items():
+            times.setdefault(name, []).extend(us / calls[int(name)] for us in samples)
+        exudyn_times += exudyn_iteration_times()
+    for name, samples in times.items():
+        results.append(windows_row(int(name), "mstmm", samples))
+    results += [windows_row(SIZES[-1], "Exudyn", exudyn_times)] if exudyn_times else []
+    return results + tangent_rows(rounds) + platform_rows(rounds) + squeezer_rows(rounds)
 
 
-def row_of(count: int, tool: str, times: list[float], what: str = "") -> dict[str, Any]:
-    """A row of the table for so many windows, by microseconds of an evaluation or of `what`."""
+def windows_row(count: int, tool: str, times: list[float], quantity: str = "") -> dict[str, Any]:
+    """Row of the table for `count` windows; times in microseconds."""
     bodies = 2 * count + 1
-    return {"scene": f"{count} windows{what}", "tool": tool, "us": times,
-            "ns a body": [1e3 * us / bodies for us in times]}  # fmt: skip
+    return {"scene": f"{count} windows{quantity}", "tool": tool, "us": times,
+            "ns_per_body": [1e3 * us / bodies for us in times]}  # fmt: skip
 
 
-def tangents(rounds: int) -> list[dict[str, Any]]:
-    """Factors and one solution of an implicit step of 0.2 ms, windows in a row."""
+def tangent_rows(rounds: int) -> list[dict[str, Any]]:
+    """Tangent and one solution of an implicit step of 0.2 ms for rows of windows."""
     rng, calls, work = np.random.default_rng(1), 4000, {}
-    for count in FACTORED:
+    for count in IMPLICIT_SIZES:
         model = mstmm.compile(windows(count), engine="looped")
-        work[count] = factoring(model, rng.normal(size=model.nu), calls // count)
-    timed = {str(count): lambda one=one: measure.once(one) for count, one in work.items()}
+        work[count] = tangent_call(model, rng.normal(size=model.nu), calls // count)
+    timers = {str(count): lambda call=call: measure.call_time(call) for count, call in work.items()}
     return [
-        row_of(int(name), "mstmm", [1e6 * s / (calls // int(name)) for s in found], ", implicit")
-        for name, found in measure.rounds(timed, rounds).items()
+        windows_row(
+            int(name), "mstmm", [1e6 * s / (calls // int(name)) for s in samples], ", implicit"
+        )
+        for name, samples in measure.sample_rounds(timers, rounds).items()
     ]
 
 
-def factoring(model: mstmm.Model, r: np.ndarray, calls: int) -> Callable[[], None]:
-    """So many tangents at the start, each with a solution."""
+def tangent_call(model: mstmm.Model, right_hand_side: np.ndarray, calls: int) -> Callable[[], None]:
+    """`calls` tangents at the initial state, each with a solution."""
     tangent = TangentMatrix(model.looped)
     tangent.residual(0.0, *model.initial_state())
 
     def run() -> None:
         for _ in range(calls):
             tangent.factor(5e3, 5e3)
-            tangent.solve(r)
+            tangent.solve(right_hand_side)
 
     return run
 
 
-def iteration_beside() -> list[float]:
-    """Microseconds of an iteration of Exudyn's on the longest row of windows, if it is there."""
+def exudyn_iteration_times() -> list[float]:
+    """Microseconds of one Newton iteration of Exudyn on the longest row of windows."""
     try:
         import exudyn_planar
     except ImportError:
-        print("Exudyn is not here")
+        print("Exudyn is not installed")
         return []
-    made, count = exudyn_planar.windows(SIZES[-1]), [0]
+    system, count = exudyn_planar.build_windows(SIZES[-1]), [0]
 
     def run() -> None:
-        count[0] = made.run(0.01, 10, sparse=True, modified=False)[0]
+        count[0] = system.run(0.01, 10, sparse=True, reuse_jacobian=False)[0]
 
-    return [1e6 * measure.cpu(run) / count[0]]
+    return [1e6 * measure.cpu_time(run) / count[0]]
 
 
-def platform_beside(rounds: int) -> list[dict[str, Any]]:
-    """Stewart's platform by us and by MuJoCo."""
+def platform_rows(rounds: int) -> list[dict[str, Any]]:
+    """Rows of the Stewart platform: mstmm and MuJoCo."""
     model = mstmm.compile(platform(), engine="looped")
     fused = mstmm.compile(platform(), engine="fused")
     q, u = fused.initial_state()
@@ -172,22 +172,26 @@ def platform_beside(rounds: int) -> list[dict[str, Any]]:
     count, work = 2000, {
         "mstmm": evaluations(model, 2000), "mstmm fused": lambda: subject.time(True, 2000)
     }  # fmt: skip
-    off = measure.disagreement(slides(fused), slides(model))
-    apart = {"mstmm": 0.0, "mstmm fused": off}
+    fused_difference = measure.relative_difference(
+        leg_accelerations(fused), leg_accelerations(model)
+    )
+    differences = {"mstmm": 0.0, "mstmm fused": fused_difference}
     try:
         from mujoco_platform import MujocoPlatform
 
         peer = MujocoPlatform(model)
         work["MuJoCo"] = lambda: peer.forward(count)
-        apart["MuJoCo"] = measure.disagreement(peer.slides(), slides(model))
+        differences["MuJoCo"] = measure.relative_difference(
+            peer.leg_accelerations(), leg_accelerations(model)
+        )
     except ImportError:
-        print("MuJoCo is not here")
-    return [{"scene": "platform", "tool": name, "us": found, "apart": apart[name]}
-            for name, found in per_evaluation(work, count, rounds).items()]  # fmt: skip
+        print("MuJoCo is not installed")
+    return [{"scene": "platform", "tool": name, "us": samples, "difference": differences[name]}
+            for name, samples in evaluation_times(work, count, rounds).items()]  # fmt: skip
 
 
-def squeezer_beside(rounds: int) -> list[dict[str, Any]]:
-    """Andrews' squeezer to 1e-6 rad."""
+def squeezer_rows(rounds: int) -> list[dict[str, Any]]:
+    """Rows of Andrews' squeezer to 1e-6 rad."""
     import squeezer
 
     scene = mstmm.load_scene(squeezer.SCENE)
@@ -200,72 +204,85 @@ def squeezer_beside(rounds: int) -> list[dict[str, Any]]:
         "Exudyn": lambda: squeezer.exudyn_runs(data),
     }
     settings = {}
-    for name, make in makers.items():
+    for name, build in makers.items():
         try:
-            settings[name] = squeezer.around(make(), ASKED)
+            settings[name] = squeezer.bracket_error(build(), TARGET_ERROR)
         except (ImportError, SystemExit) as error:
-            print(f"{name} is not here: {error}")
-    work = {f"{name}: {setting}": run for name, two in settings.items()
-            for setting, (run, _) in two.items()}  # fmt: skip
-    times = per_evaluation(work, 1, rounds)
-    return [_at_error(name, two, [times[f"{name}: {setting}"] for setting in two])
-            for name, two in settings.items()]  # fmt: skip
+            print(f"{name} left out: {error}")
+    work = {f"{name}: {setting}": run for name, bracket in settings.items()
+            for setting, (run, _) in bracket.items()}  # fmt: skip
+    times = evaluation_times(work, 1, rounds)
+    return [_row_at_error(name, bracket, [times[f"{name}: {setting}"] for setting in bracket])
+            for name, bracket in settings.items()]  # fmt: skip
 
 
-def _at_error(name: str, two: dict[str, Any], times: list[list[float]]) -> dict[str, Any]:
-    """The row of a tool from the times of its settings, round by round."""
+def _row_at_error(name: str, bracket: dict[str, Any], times: list[list[float]]) -> dict[str, Any]:
+    """Row of a program, interpolated between two settings in each round."""
     import squeezer
 
-    errors = [error for _, error in two.values()]
-    found = [squeezer.at_error(ASKED, errors, list(both)) for both in zip(*times, strict=True)]
-    return {"scene": "Andrews to 1e-6", "tool": name, "us": found, "apart": ASKED,
-            "settings": dict(zip(two, errors, strict=True))}  # fmt: skip
+    errors = [error for _, error in bracket.values()]
+    samples = [
+        squeezer.interpolate_time(TARGET_ERROR, errors, list(round_times))
+        for round_times in zip(*times, strict=True)
+    ]
+    return {"scene": "Andrews to 1e-6", "tool": name, "us": samples, "difference": TARGET_ERROR,
+            "settings": dict(zip(bracket, errors, strict=True))}  # fmt: skip
 
 
 def ratios(results: list[dict[str, Any]]) -> list[tuple[str, str, float, float]]:
-    """(what, where, measured, asked at most), least times over least times."""
-    by = {(row["scene"], row["tool"]): min(row["us"]) for row in results}
-    bodies = {size: by[f"{size} windows", "mstmm"] / (2 * size + 1) for size in SIZES}
-    found = [("a body / one of 50 windows", f"{SIZES[-1]} windows", bodies[SIZES[-1]] / bodies[50],
-              1.2)]  # fmt: skip
-    few, many = ((f"{count} windows, implicit", "mstmm") for count in FACTORED)
-    loops = FACTORED[1] / FACTORED[0]
-    if many in by:
-        found.append((f"a loop / one of {FACTORED[0]} windows", many[0], by[many] / by[few] / loops,
+    """(quantity, scene, measured, target), ratios of minimum times."""
+    least_times = {(row["scene"], row["tool"]): min(row["us"]) for row in results}
+    bodies = {size: least_times[f"{size} windows", "mstmm"] / (2 * size + 1) for size in SIZES}
+    largest = SIZES[-1]
+    rows = [("time per body / that of 50 windows", f"{largest} windows",
+             bodies[largest] / bodies[50], 1.2)]  # fmt: skip
+    short, long = ((f"{count} windows, implicit", "mstmm") for count in IMPLICIT_SIZES)
+    loops = IMPLICIT_SIZES[1] / IMPLICIT_SIZES[0]
+    if long in least_times:
+        rows.append((f"time per loop / that of {IMPLICIT_SIZES[0]} windows", long[0],
+        least_times[long] / least_times[short] / loops,
                       1.5))  # fmt: skip
-    for scene, tool, asked in COMPARED:
-        if (scene, tool) in by:
-            own = "mstmm fused" if (scene, "mstmm fused") in by else "mstmm"
-            found.append((f"{own} / {tool}", scene, by[scene, own] / by[scene, tool], asked))
-    return found
+    for scene, tool, target in COMPARISONS:
+        if (scene, tool) in least_times:
+            own_tool = "mstmm fused" if (scene, "mstmm fused") in least_times else "mstmm"
+            rows.append(
+                (
+                    f"{own_tool} / {tool}",
+                    scene,
+                    least_times[scene, own_tool] / least_times[scene, tool],
+                    target,
+                )
+            )
+    return rows
 
 
 def table(results: list[dict[str, Any]]) -> str:
-    """Least times, and ratios."""
+    """Markdown: minimum times and ratios."""
     lines = ["# Closed loops", "",
-             "| scene | tool | us an evaluation, tangent or run | ns a body | apart |",
+             "| scene | program | us per evaluation, tangent or run | ns per body | difference |",
              "|---|---|---|---|---|"]  # fmt: skip
     for row in results:
-        body = f"{min(row['ns a body']):.0f}" if "ns a body" in row else ""
-        apart = f"{row['apart']:.1e}" if "apart" in row else ""
+        body = f"{min(row['ns_per_body']):.0f}" if "ns_per_body" in row else ""
+        difference = f"{row['difference']:.1e}" if "difference" in row else ""
         lines.append(
-            f"| {row['scene']} | {row['tool']} | {min(row['us']):.3g} | {body} | {apart} |"
+            f"| {row['scene']} | {row['tool']} | {min(row['us']):.3g} | {body} | {difference} |"
         )
-    for what, where, value, asked in ratios(results):
-        lines += ["", f"{where}: {what}, where {asked} was asked at most: {value:.3g}."]
-    lines += ["", "MuJoCo's rows yield, as stiff as it lets them be; `apart` is how far its legs "
-              "are off. Of Andrews' crank `apart` is the error, between two settings."]  # fmt: skip
+    for quantity, scene, value, target in ratios(results):
+        lines += ["", f"{scene}: {quantity}: {value:.3g} (target: at most {target})."]
+    lines += [
+        "",
+        "MuJoCo's constraints are soft. For Andrews' crank `difference` is the error, rad.",
+    ]
     return "\n".join(lines) + "\n"
 
 
 def main() -> None:
-    """Measures and writes result.json and result.md; with --quick it only prints."""
+    """Measure and write result.json and result.md; with --quick only print."""
     quick = "--quick" in sys.argv
-    results = measured(quick)
+    results = measure_all(quick)
     print(table(results))
     if not quick:
-        record = {"machine": measure.machine(), "results": results}
-        (HERE / "result.json").write_text(json.dumps(record, indent=1), encoding="utf-8")
+        measure.save_record(HERE / "result.json", results)
         (HERE / "result.md").write_text(table(results), encoding="utf-8")
 
 

@@ -1,10 +1,10 @@
-"""How often guards cry wolf, and how often they sleep.
+"""False-alarm and miss rates of the risk checks.
 
-    python -m benchmarks.guards [--tuning] [--each N] [--seed N] [--only FAMILY]
+    python -m benchmarks.risk_checks [--tuning] [--each N] [--seed N] [--only FAMILY]
 
-Scenes are drawn afresh, with the number that breaks a method on both sides of where it does.  Each
-run is compared with an accurate one: is it really wrong, by the bound that the table states, and
-did the guard say so?  Limits were set on the seed of `--tuning`; no time is measured.
+Random scenes, with a parameter on both sides of the value at which a method fails.  Each run is
+compared with an accurate one: it is wrong if its error exceeds the bound in the table.  The limits
+of the checks were set on the seed of `--tuning`.  No time is measured.
 """
 
 from __future__ import annotations
@@ -21,51 +21,52 @@ from typing import Any
 import numpy as np
 
 from . import bodies, motions
-from .report import Judged, counts, table
+from .report import CheckCase, counts, table
 from .trials import Trial
 
 HERE = Path(__file__).resolve().parent
 
-#: Seeds: on which limits were set, and on which they are judged.
-TUNING, JUDGING = 1, 2028
+#: Seeds on which the limits were set and tested.
+TUNING_SEED, TEST_SEED = 1, 2028
 
 FAMILIES: dict[str, Callable[[np.random.Generator], Trial]] = {
-    f.__name__.replace("_", " "): f
-    for f in (
+    family.__name__.replace("_", " "): family
+    for family in (
         motions.explicit_step, motions.implicit_step, motions.pulse_in_angle,
-        motions.pulse_in_time, motions.heavy_tip, motions.three_angles, motions.loose_balls,
-        bodies.spun_linear, bodies.light_hub, bodies.bent_far, bodies.shaken,
+        motions.pulse_in_time, motions.heavy_tip, motions.gimbal_top, motions.loose_balls,
+        bodies.spinning_linear_beam, bodies.light_hub, bodies.strongly_bent_beam, bodies.shaken_beam,
     )
 }  # fmt: skip
 
-_MOTION = "0.1 rad or of the motion"
+_MOTION_ERROR = "0.1 rad or of the motion"
 
-GUARDS = (
-    Judged("step-stability", True, "explicit step", "step times fastest motion, 0.2 to 20",
-           f"error above {_MOTION}"),
-    Judged("step-accuracy", False, "implicit step", "step, 2 ms to 1 s, of swinging rods",
-           f"error above {_MOTION}"),
-    Judged("energy-drift", False, "implicit step", "the same", f"error above {_MOTION}"),
-    Judged("narrow-load", False, "pulse in angle", "width, 0.1 mrad to 1 rad",
+CHECK_CASES = (
+    CheckCase("step-stability", True, "explicit step", "step times fastest motion, 0.2 to 20",
+           f"error above {_MOTION_ERROR}"),
+    CheckCase("step-accuracy", False, "implicit step", "step, 2 ms to 1 s, of swinging rods",
+           f"error above {_MOTION_ERROR}"),
+    CheckCase("energy-drift", False, "implicit step", "the same", f"error above {_MOTION_ERROR}"),
+    CheckCase("narrow-load", False, "pulse in angle", "width, 0.1 mrad to 1 rad",
            "error above 1e-3 and 100 rtol"),
-    Judged("narrow-load", True, "pulse in time", "width in steps, 0.02 to 20", "error above 1e-3"),
-    Judged("pivot-loss", True, "heavy tip", "mass in others', 1e2 to 1e13",
+    CheckCase("narrow-load", True, "pulse in time", "width in steps, 0.02 to 20",
+    "error above 1e-3"),
+    CheckCase("pivot-loss", True, "heavy tip", "mass in others', 1e2 to 1e13",
            "accelerations off by 1e-8"),
-    Judged("pivot-loss", False, "heavy tip", "the same", "accelerations off by 1e-8"),
-    Judged("gimbal", False, "three angles", "distance from the lock, 1e-6 to 0.5 rad",
+    CheckCase("pivot-loss", False, "heavy tip", "the same", "accelerations off by 1e-8"),
+    CheckCase("gimbal", False, "gimbal top", "distance from the lock, 1e-6 to 0.5 rad",
            "attitude off by 1e-5 (fixed steps), 10 rtol"),
-    Judged("quaternion-length", False, "loose balls", "rtol, 1e-8 to 0.03", "error above 0.01"),
-    Judged("energy-drift", False, "loose balls", "the same", "error above 0.01"),
-    Judged("stiffening", True, "spun linear", "spin in first frequencies, 0.03 to 2",
+    CheckCase("quaternion-length", False, "loose balls", "rtol, 1e-8 to 0.03", "error above 0.01"),
+    CheckCase("energy-drift", False, "loose balls", "the same", "error above 0.01"),
+    CheckCase("stiffening", True, "spinning linear beam", "spin in first frequencies, 0.03 to 2",
            "deflection off by 10 %"),
-    Judged("stiffening", False, "spun linear", "the same", "deflection off by 10 %"),
-    Judged("one-way-coupling", False, "light hub", "hub in the beam's inertia, 0.03 to 300",
+    CheckCase("stiffening", False, "spinning linear beam", "the same", "deflection off by 10 %"),
+    CheckCase("one-way-coupling", False, "light hub", "hub in the beam's inertia, 0.03 to 300",
            "tip off by 30 % of its deflection"),
-    Judged("slope", False, "bent far", "force at the tip, 0.02 to 2 EI/L²",
+    CheckCase("slope", False, "strongly bent beam", "force at the tip, 0.02 to 2 EI/L²",
            "tip off by 2 % of the length"),
-    Judged("shapes", True, "shaken", "frequency in the last shape's, 0.05 to 8",
+    CheckCase("shapes", True, "shaken beam", "frequency in the last shape's, 0.05 to 8",
            "deflection off by 10 %"),
-    Judged("shapes", False, "shaken", "the same", "deflection off by 10 %"),
+    CheckCase("shapes", False, "shaken beam", "the same", "deflection off by 10 %"),
 )  # fmt: skip
 
 
@@ -75,25 +76,30 @@ def main() -> None:
     parser.add_argument("--tuning", action="store_true", help="the seed on which limits were set")
     parser.add_argument("--each", type=int, default=100, help="scenes of each family")
     parser.add_argument("--seed", type=int, default=None)
-    parser.add_argument("--only", default=None, help="this family alone; nothing is written")
+    parser.add_argument("--only", default=None, help="only this family; nothing is written")
     parser.add_argument("--out", type=Path, default=HERE, help="folder of result.json, result.md")
     options = parser.parse_args()
-    seed = (TUNING if options.tuning else JUDGING) if options.seed is None else options.seed
+    seed = (TUNING_SEED if options.tuning else TEST_SEED) if options.seed is None else options.seed
     warnings.simplefilter("ignore", RuntimeWarning)  # of runs that go to infinity
-    found: dict[str, list[Trial]] = {}
-    for place, (name, family) in enumerate(FAMILIES.items()):
+    trials: dict[str, list[Trial]] = {}
+    for index, (name, family) in enumerate(FAMILIES.items()):
         if options.only in (None, name):
-            rngs = (np.random.default_rng([seed, place, i]) for i in range(options.each))
-            found[name] = [family(rng) for rng in rngs]
-            for one in GUARDS:
-                if one.family == name:
-                    print(one.guard, one.before, name, counts(one, found[name]), flush=True)
+            rngs = (np.random.default_rng([seed, index, i]) for i in range(options.each))
+            trials[name] = [family(rng) for rng in rngs]
+            for case in CHECK_CASES:
+                if case.family == name:
+                    print(case.risk, case.before_run, name, counts(case, trials[name]), flush=True)
     data = {"each": options.each, "seed": seed, "tuning": options.tuning}
     if options.only is None:
-        text = table(GUARDS, found, data)
+        text = table(CHECK_CASES, trials, data)
         print(text)
-        kept = {name: [_row(trial) for trial in some] for name, some in found.items()}
-        lines = json.dumps(data | kept, allow_nan=False).replace('{"drawn"', '\n{"drawn"') + "\n"
+        rows_by_family = {name: [_row(trial) for trial in rows] for name, rows in trials.items()}
+        lines = (
+            json.dumps(data | rows_by_family, allow_nan=False).replace(
+                '{"drawn_value"', '\n{"drawn_value"'
+            )
+            + "\n"
+        )
         (options.out / "result.json").write_text(lines, encoding="utf-8")
         (options.out / "result.md").write_text(text, encoding="utf-8")
 
@@ -101,7 +107,7 @@ def main() -> None:
 def _row(trial: Trial) -> dict[str, Any]:
     """Plain data with three digits; an error without a number is null."""
     row = asdict(trial)
-    for key in ("drawn", "error"):
+    for key in ("drawn_value", "error"):
         row[key] = float(f"{row[key]:.3g}") if math.isfinite(row[key]) else None
     return row
 

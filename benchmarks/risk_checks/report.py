@@ -1,4 +1,4 @@
-"""False alarms and misses of every guard, as a page."""
+"""Page of false-alarm and miss rates of the checks."""
 
 from __future__ import annotations
 
@@ -10,56 +10,57 @@ from .trials import Trial
 
 
 @dataclass(frozen=True)
-class Judged:
-    """A guard at one time, on one family of scenes: the name of its risk, whether before the run or
-    behind it, what is drawn, and what counts as wrong."""
+class CheckCase:
+    """A check before or after a run on a family of scenes: name of its risk, random parameter, and
+    the error that counts as wrong."""
 
-    guard: str
-    before: bool
+    risk: str
+    before_run: bool
     family: str
-    drawn: str
-    wrong: str
+    drawn_value: str
+    is_wrong: str
 
 
-def told(one: Judged, trial: Trial) -> bool:
-    """Whether it said so."""
-    return one.guard in (trial.before if one.before else trial.after)
+def is_reported(case: CheckCase, trial: Trial) -> bool:
+    """Whether the check reported its risk."""
+    return case.risk in (trial.reported_before if case.before_run else trial.reported_after)
 
 
-def counts(one: Judged, trials: Sequence[Trial]) -> dict[str, int]:
-    """Runs that are wrong and fine, alarms among the fine ones, misses among the wrong ones."""
-    wrong = [trial for trial in trials if trial.wrong and (one.before or not trial.failed)]
-    fine = [trial for trial in trials if not trial.wrong]
+def counts(case: CheckCase, trials: Sequence[Trial]) -> dict[str, int]:
+    """Numbers of wrong and correct runs, misses and false alarms."""
+    wrong = [trial for trial in trials if trial.is_wrong and (case.before_run or not trial.failed)]
+    correct = [trial for trial in trials if not trial.is_wrong]
     return {
-        "wrong": len(wrong), "misses": sum(not told(one, trial) for trial in wrong),
-        "fine": len(fine), "false_alarms": sum(told(one, trial) for trial in fine),
-        "unguarded": sum(not (trial.after or told(one, trial)) for trial in wrong),
+        "wrong": len(wrong), "misses": sum(not is_reported(case, trial) for trial in wrong),
+        "fine": len(correct), "false_alarms": sum(is_reported(case, trial) for trial in correct),
+        "unguarded": sum(not (trial.reported_after or is_reported(case, trial)) for trial in wrong),
     }  # fmt: skip
 
 
-def table(judged: Sequence[Judged], found: Mapping[str, Sequence[Trial]], data: Any) -> str:
+def table(cases: Sequence[CheckCase], trials: Mapping[str, Sequence[Trial]], data: Any) -> str:
     """The page."""
     lines = [
-        "# Rates of the guards",
+        "# False-alarm and miss rates of the checks",
         "",
         f"{data['each']} scenes of each family, seed {data['seed']} "
         f"({'on which limits were set' if data['tuning'] else 'limits were set on another'}).  "
-        "A run is wrong where the stated error, by an accurate run, is above the stated bound, or "
-        "where it failed; those that failed, and said so themselves, do not count behind the run.  "
-        "*Unseen*: wrong runs of which no guard at all said anything.",
+        "A run is wrong if its error against an accurate run exceeds the stated bound, or if it "
+        "failed; failed runs do not count for checks after the run.  *Unreported*: wrong runs "
+        "without any report.",
         "",
-        "| guard | when | family | drawn | wrong is | missed | false alarms | unseen |",
+        "| check | when | family | parameter | wrong if | missed | false alarms | unreported |",
         "|---|---|---|---|---|---|---|---|",
     ]
-    for one in judged:
-        c = counts(one, found[one.family])
+    for case in cases:
+        c = counts(case, trials[case.family])
         lines.append(
-            f"| `{one.guard}` | {'before' if one.before else 'after'} | {one.family} | {one.drawn} "
-            f"| {one.wrong} | {_share(c['misses'], c['wrong'])} "
-            f"| {_share(c['false_alarms'], c['fine'])} | {c['unguarded']} |"
+            f"| `{case.risk}` | {'before' if case.before_run else 'after'} | {case.family} "
+            f"| {case.drawn_value} "
+            f"| {case.is_wrong} | {_share_text(c['misses'], c['wrong'])} "
+            f"| {_share_text(c['false_alarms'], c['fine'])} | {c['unguarded']} |"
         )
     return "\n".join(lines) + "\n"
 
 
-def _share(some: int, of: int) -> str:
-    return f"{some} of {of} ({100 * some / of:.0f} %)" if of else "0 of 0"
+def _share_text(count: int, total: int) -> str:
+    return f"{count} of {total} ({100 * count / total:.0f} %)" if total else "0 of 0"

@@ -1,4 +1,4 @@
-"""A run whose guard is judged: what it said before and behind it, and how wrong it really is."""
+"""A run with the risks reported before and after it, and its true error."""
 
 from __future__ import annotations
 
@@ -21,61 +21,63 @@ Scene = dict[str, Any]
 
 @dataclass(frozen=True)
 class Trial:
-    """What came out of one.
+    """Outcome of one run.
 
     Attributes:
-        drawn: the number that was drawn on both sides of where the method fails.
-        before, after: names of the risks that were told before the run, and behind it.
-        error: of the run, by an accurate one, as a part of what counts as wrong.
-        failed: it did not come to its end, and said so.
+        drawn_value: random parameter, on both sides of the value at which the method fails.
+        reported_before, reported_after: names of the risks reported before and after the run.
+        error: error against an accurate run, relative to the bound of a wrong run.
+        failed: whether the run reported a failure.
     """
 
-    drawn: float
-    before: tuple[str, ...]
-    after: tuple[str, ...]
+    drawn_value: float
+    reported_before: tuple[str, ...]
+    reported_after: tuple[str, ...]
     error: float
     failed: bool = False
 
     @property
-    def wrong(self) -> bool:
-        """Whether the run is really wrong: also where it failed or gave no number."""
+    def is_wrong(self) -> bool:
+        """Whether the run is wrong, failed or is not finite."""
         return not self.error <= 1.0
 
 
-def model(scene: Scene, **options: Any) -> mstmm.Model:
-    """A scene by the looped engine."""
+def build_model(scene: Scene, **options: Any) -> mstmm.Model:
+    """Model on the looped engine."""
     return mstmm.compile(mstmm.Scene(**{"gravity": [0, 0, 0], **scene}), engine="looped", **options)
 
 
-def names(risks: Iterable[Risk]) -> tuple[str, ...]:
-    """Each once."""
+def unique_names(risks: Iterable[Risk]) -> tuple[str, ...]:
+    """Names without repetition."""
     return tuple(dict.fromkeys(risk.name for risk in risks))
 
 
-def tried(one: mstmm.Model, t_end: float, **settings: Any) -> tuple[Result, tuple[str, ...]]:
-    """A run, and the names of what was told before it; of its fixed step the run itself tells."""
-    q, u = settings.get("initial") or one.initial_state()
-    known = {key: value for key, value in settings.items() if key in ("method", "step")}
-    seen = check_before_run(
-        one, Settings(t_end, **known), np.asarray(q, float), np.asarray(u, float)
+def run_trial(tested: mstmm.Model, t_end: float, **settings: Any) -> tuple[Result, tuple[str, ...]]:
+    """A run and the names of the risks reported before it."""
+    q, u = settings.get("initial") or tested.initial_state()
+    method_settings = {key: value for key, value in settings.items() if key in ("method", "step")}
+    reported = check_before_run(
+        tested, Settings(t_end, **method_settings), np.asarray(q, float), np.asarray(u, float)
     ).risks
-    run = one.simulate(t_end, **settings)
-    return run, names((*seen, *(risk for risk in run.risks if risk.seen_before_run)))
+    run = tested.simulate(t_end, **settings)
+    return run, unique_names((*reported, *(risk for risk in run.risks if risk.seen_before_run)))
 
 
-def judged(drawn: float, run: Result, before: tuple[str, ...], error: float) -> Trial:
-    """The trial of a run with this error, in parts of what is wrong."""
-    after = names(
+def trial(drawn_value: float, run: Result, risks: tuple[str, ...], error: float) -> Trial:
+    """Outcome of a run with an error relative to the bound of a wrong run."""
+    reported_after = unique_names(
         tuple(risk for risk in run.risks if not risk.seen_before_run and risk.invalidates)
     )
-    return Trial(drawn, before, after, error if run.success else math.inf, not run.success)
+    return Trial(
+        drawn_value, risks, reported_after, error if run.success else math.inf, not run.success
+    )
 
 
-def off(run: Result, exact: Result) -> float:
-    """Largest error of all coordinates at the times that both have: rad, or parts of the motion."""
+def coordinate_error(run: Result, exact: Result) -> float:
+    """Largest error of all coordinates at common times: rad, or relative to the motion."""
     if not run.success:
         return math.inf
     measure = Coordinates(exact.model)
     measure.set_scales(exact.q)
-    _, ours, theirs = np.intersect1d(run.t, exact.t, return_indices=True)
-    return float(measure.distance(exact.q[theirs], run.q[ours]).max(initial=0.0))
+    _, own_indices, reference_indices = np.intersect1d(run.t, exact.t, return_indices=True)
+    return float(measure.distance(exact.q[reference_indices], run.q[own_indices]).max(initial=0.0))

@@ -1,5 +1,8 @@
-"""Four robots of the package example-robot-data, as everybody has them: rigid links, joints without
-damping, friction, limits and mimicry, which Pinocchio's algorithms and ours count differently."""
+"""Four robots of the package example-robot-data as models of mstmm, Pinocchio and MuJoCo.
+
+Rigid links; joints without damping, friction, limits and mimicry, which the programs model
+differently.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +22,7 @@ from mstmm.scene.robots.robot_model import Robot
 from mstmm.scene.robots.scene_from_robot import ImportedRobot, ImportOptions, scene_from_robot
 from mstmm.scene.robots.urdf_reader import read_urdf
 
-#: Name -> end of the file's path, and what its root stands on.
+#: Name -> end of the path of the file, and type of the root joint.
 ROBOTS = {
     "ur5": ("ur_description/urdf/ur5_robot.urdf", "fixed"),
     "panda": ("panda_description/urdf/panda.urdf", "fixed"),
@@ -27,60 +30,67 @@ ROBOTS = {
     "talos_reduced": ("talos_data/robots/talos_reduced.urdf", "free"),
 }
 
-#: What MuJoCo is to leave out beside what it does for the motion of links.
-_OFF = ("constraint", "contact", "equality", "frictionloss", "limit", "spring", "damper")
+#: Features of MuJoCo that are switched off.
+_DISABLED = ("constraint", "contact", "equality", "frictionloss", "limit", "spring", "damper")
 
 
-def path_of(end: str) -> Path:
-    """A file of the package."""
-    found = next(one for one in files("example-robot-data") or () if str(one).endswith(end))
-    return Path(str(found.locate()))
+def robot_file(end: str) -> Path:
+    """File of the package whose path ends so."""
+    package_file = next(
+        package_path
+        for package_path in files("example-robot-data") or ()
+        if str(package_path).endswith(end)
+    )
+    return Path(str(package_file.locate()))
 
 
 @dataclass(frozen=True)
 class Case:
-    """One robot, and the models that all make of it."""
+    """A robot, and its models in the three programs."""
 
     name: str
-    held: tuple[str, ...] = ()
+    fixed_joints: tuple[str, ...] = ()
 
     @cached_property
     def path(self) -> Path:
-        return path_of(ROBOTS[self.name][0])
+        return robot_file(ROBOTS[self.name][0])
 
     @property
-    def base(self) -> str:
+    def root_joint(self) -> str:
         return ROBOTS[self.name][1]
 
     @cached_property
-    def imported(self) -> ImportedRobot:
-        """The robot as a scene; its joints in `held` are fixed."""
+    def imported_robot(self) -> ImportedRobot:
+        """The robot as a scene; joints in `fixed_joints` are fixed."""
         return scene_from_robot(
-            self._bare(read_urdf(self.path.read_bytes(), self.name)), ImportOptions(self.base)
+            self._without_laws(read_urdf(self.path.read_bytes(), self.name)),
+            ImportOptions(self.root_joint),
         )
 
-    def _bare(self, robot: Robot) -> Robot:
+    def _without_laws(self, robot: Robot) -> Robot:
         joints = (
             replace(joint, type="fixed", keys={})
-            if joint.name in self.held
-            else replace(joint, keys={key: x for key, x in joint.keys.items() if key == "axis"})
+            if joint.name in self.fixed_joints
+            else replace(
+                joint, keys={key: value for key, value in joint.keys.items() if key == "axis"}
+            )
             for joint in robot.joints
         )
         return replace(robot, mimics=(), joints=tuple(joints))
 
     def model(self, engine: str) -> mstmm.Model:
-        return mstmm.compile(self.imported.scene, engine=engine)
+        return mstmm.compile(self.imported_robot.scene, engine=engine)
 
     def pinocchio(self) -> pin.Model:
-        root = (pin.JointModelFreeFlyer(),) if self.base == "free" else ()
+        root = (pin.JointModelFreeFlyer(),) if self.root_joint == "free" else ()
         return pin.buildModelFromUrdf(str(self.path), *root)
 
     def mujoco(self, step: float) -> mujoco.MjModel:
-        """With fixed links merged, RK4, and nothing but the motion of links."""
+        """Model with merged fixed links, RK4 and smooth dynamics only."""
         root = ElementTree.parse(self.path).getroot()
         for link in root.iter("link"):
-            for look in (*link.findall("visual"), *link.findall("collision")):
-                link.remove(look)
+            for geometry in (*link.findall("visual"), *link.findall("collision")):
+                link.remove(geometry)
         for joint in root.iter("joint"):
             for mimic in joint.findall("mimic"):
                 joint.remove(mimic)
@@ -88,61 +98,69 @@ class Case:
             ElementTree.SubElement(root, "mujoco"), "compiler", fusestatic="true"
         )
         spec = mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
-        if self.base == "free":
+        if self.root_joint == "free":
             spec.worldbody.bodies[0].add_freejoint()
         spec.option.integrator, spec.option.timestep = mujoco.mjtIntegrator.mjINT_RK4, step
-        for flag in _OFF:
+        for flag in _DISABLED:
             spec.option.disableflags |= getattr(mujoco.mjtDisableBit, f"mjDSBL_{flag.upper()}", 0)
-        made = spec.compile()
-        made.dof_frictionloss[:] = made.dof_damping[:] = 0.0
-        return made
+        model = spec.compile()
+        model.dof_frictionloss[:] = model.dof_damping[:] = 0.0
+        return model
 
-    def start(self, seed: int = 16) -> tuple[np.ndarray, np.ndarray]:
-        """(q, u) of ours: joints between -0.5 and 0.5 (rad, m, 1/s), a base that flies at rest."""
+    def initial_state(self, seed: int = 16) -> tuple[np.ndarray, np.ndarray]:
+        """Random (q, u) of mstmm: joints within 0.5 (rad, m, 1/s), a floating base at rest."""
         layout, rng = self.layout, np.random.default_rng(seed)
         q, u = np.zeros(layout.nq), np.zeros(layout.nu)
-        for slots in layout.hinges.values():
-            if slots.nq == 1:
-                q[slots.q], u[slots.u] = rng.uniform(-0.5, 0.5, 2)
-            elif slots.nq == 7:
-                q[slots.q : slots.q + 7] = (0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0)
+        for layout_entry in layout.hinges.values():
+            if layout_entry.nq == 1:
+                q[layout_entry.q], u[layout_entry.u] = rng.uniform(-0.5, 0.5, 2)
+            elif layout_entry.nq == 7:
+                q[layout_entry.q : layout_entry.q + 7] = (0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0)
         return q, u
 
     @cached_property
     def layout(self) -> Any:
-        return mstmm.compile(self.imported.scene, engine="looped").coordinate_layout
+        return mstmm.compile(self.imported_robot.scene, engine="looped").coordinate_layout
 
     def joints(self, peer: mujoco.MjModel) -> list[tuple[Any, int]]:
-        """Joints of one freedom: their places among ours, and their numbers in MuJoCo's model."""
-        known = self.imported.names
-        return [(self.layout.hinges[known[peer.joint(k).name]], k) for k in range(peer.njnt)
-                if peer.joint(k).name in known]  # fmt: skip
+        """Joints of one degree of freedom: layout entry in mstmm, index in MuJoCo."""
+        scene_names = self.imported_robot.names
+        return [(self.layout.hinges[scene_names[peer.joint(joint).name]],
+        joint) for joint in range(peer.njnt)
+                if peer.joint(joint).name in scene_names]  # fmt: skip
 
 
-def state_of(case: Case, peer: mujoco.MjModel, q: np.ndarray, u: np.ndarray) -> Any:
-    """MuJoCo's data in our state."""
+def mujoco_state(case: Case, peer: mujoco.MjModel, q: np.ndarray, u: np.ndarray) -> Any:
+    """MuJoCo's data at a state of mstmm."""
     data = mujoco.MjData(peer)
-    if case.base == "free":
+    if case.root_joint == "free":
         data.qpos[:7] = (0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0)
-    for ours, joint in case.joints(peer):
-        data.qpos[peer.jnt_qposadr[joint]] = q[ours.q]
-        data.qvel[peer.jnt_dofadr[joint]] = u[ours.u]
+    for layout_entry, joint in case.joints(peer):
+        data.qpos[peer.jnt_qposadr[joint]] = q[layout_entry.q]
+        data.qvel[peer.jnt_dofadr[joint]] = u[layout_entry.u]
     return data
 
 
 def pinocchio_state(case: Case, peer: pin.Model, q: np.ndarray, u: np.ndarray) -> Any:
-    """Pinocchio's q and v in our state, and the places of the joints' speeds, ours and theirs."""
-    at, v, ours, theirs = pin.neutral(peer), np.zeros(peer.nv), list[int](), list[int]()
-    if case.base == "free":
-        at[:7] = (0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+    """Pinocchio's q and v at a state of mstmm, and the speed indices of joints in both."""
+    pinocchio_q, v, own_indices, peer_indices = (
+        pin.neutral(peer),
+        np.zeros(peer.nv),
+        list[int](),
+        list[int](),
+    )
+    if case.root_joint == "free":
+        pinocchio_q[:7] = (0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
     for k in range(1, peer.njoints):
-        slots = case.layout.hinges.get(case.imported.names.get(peer.names[k], ""))
-        if slots is None or peer.nvs[k] != 1:
+        layout_entry = case.layout.hinges.get(case.imported_robot.names.get(peer.names[k], ""))
+        if layout_entry is None or peer.nvs[k] != 1:
             continue
-        angle = q[slots.q]
-        circle = [np.cos(angle), np.sin(angle)]
-        at[peer.idx_qs[k] : peer.idx_qs[k] + peer.nqs[k]] = circle if peer.nqs[k] == 2 else angle
-        v[peer.idx_vs[k]] = u[slots.u]
-        ours.append(slots.u)
-        theirs.append(peer.idx_vs[k])
-    return at, v, (ours, theirs)
+        angle = q[layout_entry.q]
+        cosine_sine = [np.cos(angle), np.sin(angle)]
+        pinocchio_q[peer.idx_qs[k] : peer.idx_qs[k] + peer.nqs[k]] = (
+            cosine_sine if peer.nqs[k] == 2 else angle
+        )
+        v[peer.idx_vs[k]] = u[layout_entry.u]
+        own_indices.append(layout_entry.u)
+        peer_indices.append(peer.idx_vs[k])
+    return pinocchio_q, v, (own_indices, peer_indices)

@@ -1,12 +1,12 @@
-"""Standing charts: eight scenes, mstmm's methods and their peers, CPU time against achieved error.
+"""Cost charts of eight scenes: CPU time over achieved error, compared with other programs.
 
     python -m benchmarks.scene_suite [SCENE ...] [--rounds N] [--budget S] [--quick] [--plot]
 
 Each scene is charted as `mstmm chart` does it: every method of mstmm over its tolerances or steps
-against a reference whose own error is stated, on both engines; the error is that of the place of
-one end (m) at the end of the run.  Peers run the same scene and are held against the same
-reference.  Then the cheapest settings of everybody are timed again in alternating rounds of one
-process: CPU time of one whole warm call that gives the end of the motion, the least of the rounds.
+against a reference of known error, on both engines; the error is that of the final position of one
+end, m.  Other programs run the same scene against the same reference.  Then the cheapest settings
+of all programs are timed in alternating rounds of one process: minimum CPU time of one whole warm
+call that returns the final state.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from pathlib import Path
 
 from ..common import measure
 from .cases import CASES
+from .comparison import Limits, compare
 from .report import page, table
-from .side_by_side import Limits, compared
 
 HERE = Path(__file__).resolve().parent
 DOCS = HERE.parents[1] / "docs"
 
 
-def arguments() -> ArgumentParser:
-    """What the command understands."""
+def command_parser() -> ArgumentParser:
+    """Parser of the command line."""
     parser = ArgumentParser(
         "python -m benchmarks.scene_suite", description=str(__doc__).split("\n")[0]
     )
@@ -37,20 +37,20 @@ def arguments() -> ArgumentParser:
     parser.add_argument("--budget", type=float, default=Limits.budget,
                         help="clock s of mstmm's settings, for each scene")  # fmt: skip
     parser.add_argument("--limit", type=float, default=Limits.run,
-                        help="CPU s of a peer's run behind which its curve ends")  # fmt: skip
+                        help="CPU s of a run of another program that ends its curve")  # fmt: skip
     parser.add_argument("--methods", default="", help="mstmm's, by name, with commas; all of them")
-    parser.add_argument("--no-peers", action="store_true", help="mstmm alone")
+    parser.add_argument("--no-peers", action="store_true", help="mstmm only")
     parser.add_argument(
-        "--quick", action="store_true", help="few settings and rounds: does it run?"
+        "--quick", action="store_true", help="few settings and rounds, to test the script"
     )
-    parser.add_argument("--plot", action="store_true", help="only draw what the JSON holds")
+    parser.add_argument("--plot", action="store_true", help="pages from the stored JSON")
     return parser
 
 
-def main(given: list[str] | None = None) -> None:
+def main(arguments: list[str] | None = None) -> None:
     """Measure; write result.json, result.md and the picture after every scene."""
-    parser = arguments()
-    options = parser.parse_args(given)
+    parser = command_parser()
+    options = parser.parse_args(arguments)
     if unknown := [name for name in options.scene if name not in CASES]:
         parser.error(f"no scene {unknown[0]!r}; there are {', '.join(CASES)}")
     methods = tuple(name for name in options.methods.split(",") if name)
@@ -58,27 +58,31 @@ def main(given: list[str] | None = None) -> None:
     if options.quick:
         limits = Limits(min(5.0, options.budget), 0.2, 1, 4, methods)
     file = options.out / "result.json"
-    kept = {}
+    stored = {}
     if file.exists():
-        kept = {one["case"]: one for one in json.loads(file.read_text())["results"]}
-    warnings.simplefilter("ignore")  # of integrators that struggle
+        stored = {result["case"]: result for result in json.loads(file.read_text())["results"]}
+    warnings.simplefilter("ignore")  # of integrators with difficulties
     for name in [] if options.plot else options.scene or list(CASES):
-        kept[name] = compared(
+        stored[name] = compare(
             CASES[name], limits, not options.no_peers, lambda text: print(text, flush=True)
         )
-        print(*(f"{name}: left out: {why}" for why in kept[name]["missing"]), sep="\n", flush=True)
-        results = [kept[one] for one in CASES if one in kept]
-        measure.save(file, results, unit="CPU ms of one run", rounds=limits.rounds)
+        print(
+            *(f"{name}: left out: {reason}" for reason in stored[name]["missing"]),
+            sep="\n",
+            flush=True,
+        )
+        results = [stored[result] for result in CASES if result in stored]
+        measure.save_record(file, results, unit="CPU ms of one run", rounds=limits.rounds)
     record = json.loads(file.read_text())
     print(table(record))
-    places = [(options.out / "result.md", options.out / "result.png")]
+    pages = [(options.out / "result.md", options.out / "result.png")]
     if options.out == HERE:
-        places.append(
+        pages.append(
             (DOCS / "benchmarks" / "scene-comparison.md", DOCS / "images" / "standing.png")
         )
     from .picture import draw
 
-    for text, picture in places:
+    for text, picture in pages:
         draw(record, picture)
         text.write_text(page(record, os.path.relpath(picture, text.parent)), encoding="utf-8")
 

@@ -1,4 +1,4 @@
-"""The eight scenes: scene, time, and the end whose place at the end is compared."""
+"""The eight scenes: scene, duration, and the end whose final position is compared."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from ..stiff import scenes as stiff
 from ..stiff.cases import Case
 
 #: Bodies of the long chain, and how far its first rod is turned at the start, rad.
-_LINKS, _TURNED = 100, 0.3
+_LINK_COUNT, _INITIAL_ANGLE = 100, 0.3
 #: Rods on bushings: how many, N/m, damping ratio.
 _BUSHINGS = (10, 1e8, 0.01)
 
 
 def long_chain() -> rigid.Scene:
-    """A hundred rods of 1 m hanging in a plane, turned in one piece and let go."""
-    still = [[0.0]] * _LINKS
-    return rigid.hanging(rigid.planar(_LINKS), [[_TURNED], *still[1:]], still)
+    """A hundred rods of 1 m hanging in a plane, rotated as a whole and released."""
+    zeros = [[0.0]] * _LINK_COUNT
+    return rigid.hanging_chain(rigid.planar(_LINK_COUNT), [[_INITIAL_ANGLE], *zeros[1:]], zeros)
 
 
 CASES = {case.name: case for case in (
     Case("arm", "arm of three rods on pins, not stiff", rigid.swinging_arm, 10.0, ("rod2.tip",)),
     Case("balls", "three rods on balls", rigid.swinging_balls, 10.0, ("rod2.tip",)),
-    Case("chain", f"chain of {_LINKS} rods", long_chain, 2.0, (f"rod{_LINKS - 1}.tip",)),
+    Case("chain", f"chain of {_LINK_COUNT} rods", long_chain, 2.0, (f"rod{_LINK_COUNT - 1}.tip",)),
     Case("bushings", f"{_BUSHINGS[0]} rods on stiff bushings, 1e{math.log10(_BUSHINGS[1]):g} N/m",
          partial(stiff.bushed_rods, *_BUSHINGS), 1.0, (f"rod{_BUSHINGS[0] - 1}.tip",),
          bushings=_BUSHINGS),
@@ -39,5 +39,5 @@ CASES = {case.name: case for case in (
          partial(rigid.example, "satellite_panels"), 10.0, ("east.tip",)),
 )}  # fmt: skip
 
-#: Those of links on pins and balls without laws, which every tool for rigid trees can run.
+#: Scenes of links on pins and balls without laws, for programs of rigid trees.
 TREES = ("arm", "balls", "chain")

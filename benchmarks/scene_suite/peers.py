@@ -1,9 +1,9 @@
-"""Peers of a case: curves of settings from loose to tight, each run giving the watched end's place.
+"""Other programs: curves of settings from loose to tight, whose runs return the end position.
 
 SciPy's and SUNDIALS' methods get mstmm's compiled equations and their exact Jacobian (as in
 `benchmarks.stiff`).  Pinocchio's accelerations are integrated by DOP853 in C, as are those of an
-algorithm written with CasADi; MuJoCo and Exudyn integrate by themselves.  One that is not
-installed, or has no such scene, is left out with a word.
+algorithm written with CasADi; MuJoCo and Exudyn use their own integrators.  Programs that
+are not installed or cannot model a scene are reported.
 """
 
 from __future__ import annotations
@@ -15,46 +15,46 @@ import numpy as np
 
 import mstmm
 
-from ..common.links import Tree, links_of
+from ..common.links import Tree, link_tree
 from ..common.native import Subject
 from ..stiff import programs
 from ..stiff.cases import Case
 from ..stiff.programs import Curve, Equations, Outcome
 from .cases import TREES
 
-Say = Callable[[str], None]
+Report = Callable[[str], None]
 
 TOLERANCES = tuple(10.0 ** (-k / 2) for k in range(4, 27))
-#: Steps a second where they are fixed, of methods of order 4 and 6.
-FOURTH, SIXTH = (
+#: Fixed steps per second, of methods of order 4 and 6.
+FOURTH_ORDER_RATES, SIXTH_ORDER_RATES = (
     tuple(10 ** (k / 4) for k in range(*ends)) for ends in ((6, 18), (4, 15))
 )  # fmt: skip
-#: What tools are called, by their functions here.
+#: Names of programs.
 NAMES = {"casadi": "CasADi", "pinocchio": "Pinocchio", "mujoco": "MuJoCo", "exudyn": "Exudyn"}
 #: Most links of which straight-line C is compiled.
-_MOST_BAKED = 30
+_MAX_BAKED_LINKS = 30
 #: Evaluations by which the fastest of several builds is chosen.
 _LOOPS = 2000
 
 
-def of_case(model: mstmm.Model, case: Case, say: Say) -> list[Curve]:
-    """Everybody who can."""
-    curves = programs.radau(model, case) + dop853(model, case)
-    curves += programs.cvode(model, case, say) + programs.exudyn(case, say)
+def case_curves(model: mstmm.Model, case: Case, report: Report) -> list[Curve]:
+    """Curves of all programs."""
+    curves = programs.radau_curves(model, case) + dop853_curves(model, case)
+    curves += programs.cvode_curves(model, case, report) + programs.exudyn_curves(case, report)
     if case.name not in TREES:
-        say(_others(case))
+        report(_missing_reason(case))
         return curves
-    tree = links_of(case.scene())
-    for maker in (casadi, pinocchio, mujoco, exudyn):
+    tree = link_tree(case.scene())
+    for builder in (casadi_curves, pinocchio_curves, mujoco_curves, exudyn_curves):
         try:
-            curves += maker(model, case, tree)
+            curves += builder(model, case, tree)
         except (ImportError, SystemExit):
-            say(f"{NAMES[maker.__name__]}: not installed")
+            report(f"{NAMES[builder.__name__]}: not installed")
     return curves
 
 
-def _others(case: Case) -> str:
-    """Why tools for rigid trees do not run a scene, as far as nothing was said yet."""
+def _missing_reason(case: Case) -> str:
+    """Reason why programs for rigid trees cannot model a scene."""
     if "beam" in case.scene():
         return (
             "Pinocchio, MuJoCo, Exudyn: no beams with such shapes (Exudyn's cables are another "
@@ -62,61 +62,63 @@ def _others(case: Case) -> str:
         )
     if case.bushings is not None:
         return "Pinocchio, MuJoCo: no bushings in a plane"
-    return "Pinocchio, MuJoCo, Exudyn: no hinges of springs in six directions that act as ours do"
+    return "Pinocchio, MuJoCo, Exudyn: no equivalent hinges with springs in six directions"
 
 
-def takes_steps(curve: Curve) -> bool:
+def has_fixed_steps(curve: Curve) -> bool:
     """Whether its settings are fixed steps, s, and no tolerances."""
-    return curve.tool == "MuJoCo" or (curve.tool == "Exudyn" and curve.manner != "DOPRI5")
+    return curve.tool == "MuJoCo" or (curve.tool == "Exudyn" and curve.variant != "DOPRI5")
 
 
-def dop853(model: mstmm.Model, case: Case) -> list[Curve]:
+def dop853_curves(model: mstmm.Model, case: Case) -> list[Curve]:
     """SciPy's DOP853 on mstmm's equations."""
     from scipy.integrate import solve_ivp
 
     equations = Equations(model, case)
 
     def run(rtol: float) -> Outcome:
-        found = solve_ivp(
+        solution = solve_ivp(
             equations.calls.rates, (0.0, case.t_end), equations.start, method="DOP853", rtol=rtol,
             atol=equations.atol(rtol, 1.0), t_eval=[case.t_end],
         )  # fmt: skip
-        if not found.success:
-            raise RuntimeError(found.message)
-        return lambda: equations.places(found.y[:, -1]), {"rates": found.nfev}
+        if not solution.success:
+            raise RuntimeError(solution.message)
+        return lambda: equations.end_positions(solution.y[:, -1]), {"rates": solution.nfev}
 
     return [Curve("SciPy DOP853", "explicit", [(t, partial(run, t)) for t in TOLERANCES])]
 
 
-# --- with accelerations, or all, of their own -----------------------------------------------------
+# --- own accelerations or integrators -----------------------------------------------------------
 
 
-def pinocchio(model: mstmm.Model, case: Case, tree: Tree) -> list[Curve]:
+def pinocchio_curves(model: mstmm.Model, case: Case, tree: Tree) -> list[Curve]:
     """Its articulated-body algorithm in C++ inside DOP853 in C."""
     from ..common import pinocchio_peer as peer
 
     q, u = model.initial_state()
     builds = peer.subjects(tree, q[None], u[None], rates=True)
-    return [_by_dop853("Pinocchio", builds, model, case, lambda q: peer.back(tree, q))]
+    return [
+        _dop853_curve("Pinocchio", builds, model, case, lambda q: peer.scene_coordinates(tree, q))
+    ]
 
 
-def casadi(model: mstmm.Model, case: Case, tree: Tree) -> list[Curve]:
+def casadi_curves(model: mstmm.Model, case: Case, tree: Tree) -> list[Curve]:
     """An articulated-body algorithm as its straight-line C, inside DOP853 in C."""
-    if len(tree.links) > _MOST_BAKED:
+    if len(tree.links) > _MAX_BAKED_LINKS:
         return []
     from ..common import casadi_peer as peer
 
     q, u = model.initial_state()
     builds = peer.subjects(tree, q[None], u[None], baked=True, sines=("", "libm"))
-    return [_by_dop853("CasADi C", builds, model, case, lambda q: q)]
+    return [_dop853_curve("CasADi C", builds, model, case, lambda q: q)]
 
 
-def _by_dop853(
+def _dop853_curve(
     tool: str, builds: dict[str, Subject], model: mstmm.Model, case: Case,
-    back: Callable[[np.ndarray], np.ndarray],
+    convert_q: Callable[[np.ndarray], np.ndarray],
 ) -> Curve:  # fmt: skip
-    """Accelerations of a tool, of several builds the fastest, inside DOP853 in C; `back` gives our
-    coordinates from its own."""
+    """Accelerations of a tool, fastest build, inside DOP853 in C; `convert_q` returns mstmm's
+    coordinates."""
     from ..common import dop853 as native
 
     name = min(builds, key=lambda k: min(builds[k].time(True, _LOOPS) for _ in range(3)))
@@ -124,12 +126,12 @@ def _by_dop853(
 
     def run(tolerance: float) -> Outcome:
         state, calls = native.run(subject, case.t_end, tolerance)
-        return lambda: place(model, case, back(state[: model.nq])), {"rates": calls}
+        return lambda: end_position(model, case, convert_q(state[: model.nq])), {"rates": calls}
 
     return Curve(tool, f"DOP853 in C, {name}", [(t, partial(run, t)) for t in TOLERANCES])
 
 
-def mujoco(model: mstmm.Model, case: Case, tree: Tree) -> list[Curve]:
+def mujoco_curves(model: mstmm.Model, case: Case, tree: Tree) -> list[Curve]:
     """Its Runge-Kutta method of fourth order, all but smooth dynamics switched off."""
     from ..common import mujoco_peer as peer
 
@@ -137,13 +139,13 @@ def mujoco(model: mstmm.Model, case: Case, tree: Tree) -> list[Curve]:
     runner = peer.MujocoRun(tree)
 
     def run(steps: int) -> Outcome:
-        end = runner.run(q, u, case.t_end, steps)
-        return lambda: place(model, case, end), {"steps": steps}
+        read_end = runner.run(q, u, case.t_end, steps)
+        return lambda: end_position(model, case, read_end), {"steps": steps}
 
-    return [Curve("MuJoCo", "RK4", _stepped(run, case, FOURTH))]
+    return [Curve("MuJoCo", "RK4", _step_settings(run, case, FOURTH_ORDER_RATES))]
 
 
-def exudyn(model: mstmm.Model, case: Case, tree: Tree) -> list[Curve]:
+def exudyn_curves(model: mstmm.Model, case: Case, tree: Tree) -> list[Curve]:
     """Its explicit methods in minimal coordinates: fixed steps, and Dormand and Prince's pair."""
     from exudyn import DynamicSolverType as Kinds
 
@@ -151,34 +153,34 @@ def exudyn(model: mstmm.Model, case: Case, tree: Tree) -> list[Curve]:
 
     runner = peer.ExudynRun(tree, *model.initial_state())
 
-    def end() -> np.ndarray:
-        return place(model, case, peer.coordinates(tree, np.asarray(runner.end()[0])))
+    def read_end() -> np.ndarray:
+        return end_position(model, case, peer.coordinates(tree, np.asarray(runner.end_state()[0])))
 
-    def fixed(steps: int) -> Outcome:
+    def run_fixed(steps: int) -> Outcome:
         runner.run(case.t_end, steps, Kinds.RK67, 0.0)
-        return end, {"steps": steps}
+        return read_end, {"steps": steps}
 
-    def adaptive(tolerance: float) -> Outcome:
+    def run_adaptive(tolerance: float) -> Outcome:
         runner.run(case.t_end, 20, Kinds.DOPRI5, tolerance)
-        return end, {}
+        return read_end, {}
 
     return [
-        Curve("Exudyn", "RK67", _stepped(fixed, case, SIXTH)),
-        Curve("Exudyn", "DOPRI5", [(t, partial(adaptive, t)) for t in TOLERANCES[:-4:2]]),
+        Curve("Exudyn", "RK67", _step_settings(run_fixed, case, SIXTH_ORDER_RATES)),
+        Curve("Exudyn", "DOPRI5", [(t, partial(run_adaptive, t)) for t in TOLERANCES[:-4:2]]),
     ]
 
 
-def _stepped(
+def _step_settings(
     run: Callable[[int], Outcome], case: Case, rates: tuple[float, ...]
 ) -> list[tuple[float, Callable[[], Outcome]]]:
     counts = [max(1, round(case.t_end * rate)) for rate in rates]
     return [(case.t_end / count, partial(run, count)) for count in counts]
 
 
-def place(model: mstmm.Model, case: Case, q: np.ndarray) -> np.ndarray:
+def end_position(model: mstmm.Model, case: Case, q: np.ndarray) -> np.ndarray:
     """(1, 3) of the watched end, m, at coordinates q."""
     state = np.asarray(q, dtype=float), np.zeros(model.nu)
     result = model.simulate(
         case.t_end, t_start=case.t_end, initial=state, output_times=[case.t_end]
     )
-    return np.asarray(result.position(case.watched[-1])[-1:])
+    return np.asarray(result.position(case.end_names[-1])[-1:])

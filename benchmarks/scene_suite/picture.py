@@ -1,4 +1,4 @@
-"""The picture of the standing charts: CPU time against achieved error, a panel for each scene."""
+"""Picture of the cost charts: CPU time over achieved error, a panel per scene."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ import matplotlib.pyplot as plt
 from matplotlib.lines import Line2D
 
 from ..common import style
-from .side_by_side import ASKED, OWN
+from .comparison import OWN, TARGET_ERRORS
 
-LOOKS: dict[str, dict[str, Any]] = {
+LINE_STYLES: dict[str, dict[str, Any]] = {
     OWN: {"color": "#c1121f", "marker": "o", "lw": 2.2, "zorder": 5},
     "SciPy Radau": {"color": "#1d3557", "marker": "^", "lw": 1.3, "ls": "--"},
     "SciPy DOP853": {"color": "#6c9bd2", "marker": "v", "lw": 1.3, "ls": "--"},
     "CVODE BDF": {"color": "#8d6a9f", "marker": "X", "lw": 1.3, "ls": "--"},
     "CasADi C": {"color": "#c98a00", "marker": "s", "lw": 1.5},
-    "Pinocchio": style.LOOKS["Pinocchio"],
-    "MuJoCo": style.LOOKS["MuJoCo"],
-    "Exudyn": style.LOOKS["Exudyn"],
+    "Pinocchio": style.LINE_STYLES["Pinocchio"],
+    "MuJoCo": style.LINE_STYLES["MuJoCo"],
+    "Exudyn": style.LINE_STYLES["Exudyn"],
 }
-#: Of mstmm's single methods, behind its front.
-_BEHIND: dict[str, Any] = {"color": "#c1121f", "lw": 0.7, "alpha": 0.3, "zorder": 1}
+#: Line style of single methods of mstmm.
+_BACKGROUND: dict[str, Any] = {"color": "#c1121f", "lw": 0.7, "alpha": 0.3, "zorder": 1}
 #: Largest and smallest error that is shown, m.
 ERRORS = (1e-1, 1e-10)
 COLUMNS = 4
@@ -49,7 +49,7 @@ def draw(record: dict[str, Any], path: Path) -> None:
     for axes in panels.flat[max(0, len(results) - columns) : len(results)]:
         axes.set_xlabel("error at the end, m" + " (more accurate to the right)" * (columns < 4))
     _legend(figure, results)
-    style.footer(
+    style.add_footer(
         figure, record,
         "Least CPU time of a whole warm call; peers and mstmm's cheapest settings timed in "
         "alternating rounds.  The numbers above the panels: mstmm's time in that of the best peer.",
@@ -59,54 +59,48 @@ def draw(record: dict[str, Any], path: Path) -> None:
 
 
 def _legend(figure: Any, results: list[dict[str, Any]]) -> None:
-    shown = [tool for tool in LOOKS if any(tool in one["fronts"] for one in results)]
+    tools = [tool for tool in LINE_STYLES if any(tool in result["fronts"] for result in results)]
     handles = [
-        Line2D([], [], label="mstmm, its cheapest" if tool == OWN else tool, **LOOKS[tool])
-        for tool in shown
+        Line2D([], [], label="mstmm, its cheapest" if tool == OWN else tool, **LINE_STYLES[tool])
+        for tool in tools
     ]
-    handles.insert(1, Line2D([], [], label="mstmm's single methods", **_BEHIND))
+    handles.insert(1, Line2D([], [], label="mstmm's single methods", **_BACKGROUND))
     columns = len(handles) if len(results) > 2 else 3
     figure.legend(handles=handles, loc="upper center", ncol=columns, fontsize=9)
 
 
 def _panel(axes: Any, result: dict[str, Any]) -> None:
-    for points in result["single"].values():
-        axes.plot(*zip(*points, strict=True), **_BEHIND)
-    heights = []
-    for tool, looks in LOOKS.items():
-        lowest = _lowest(result["fronts"].get(tool, []))
-        heights += [time for error, time in lowest if ERRORS[1] <= error <= ERRORS[0]]
-        if lowest:
-            axes.plot(*zip(*lowest, strict=True), **looks)
-            first = lowest[0]  # what is less accurate costs as much: no cheaper setting is known
-            axes.plot([ERRORS[0], first[0]], [first[1]] * 2, color=looks["color"], lw=0.8, ls=":")
-    axes.set(xscale="log", yscale="log", xlim=ERRORS, ylim=(0.6 * min(heights), 1.6 * max(heights)))
+    for curve in result["method_curves"].values():
+        axes.plot(*zip(*curve, strict=True), **_BACKGROUND)
+    times = []
+    for tool, line_style in LINE_STYLES.items():
+        points = result["fronts"].get(tool, [])
+        envelope = style.pareto_front(
+            (p["error_bound_m"], p["cpu_ms"]) for p in points if p["error_bound_m"] > 0
+        )
+        times += [time for error, time in envelope if ERRORS[1] <= error <= ERRORS[0]]
+        if envelope:
+            axes.plot(*zip(*envelope, strict=True), **line_style)
+            loosest = envelope[0]  # no cheaper setting is known for larger errors
+            axes.plot(
+                [ERRORS[0], loosest[0]], [loosest[1]] * 2, color=line_style["color"], lw=0.8, ls=":"
+            )
+    axes.set(xscale="log", yscale="log", xlim=ERRORS, ylim=(0.6 * min(times), 1.6 * max(times)))
     axes.xaxis.minorticks_off()
     axes.text(0.0, 1.14, result["title"], transform=axes.transAxes, fontsize=9, weight="bold")
-    for row, asked in enumerate(ASKED):
-        axes.axvline(asked, color="black", lw=0.7, ls=":")
-        said = _told(result["recommended"][f"{asked:g}"])
-        axes.text(0.0, 1.075 - 0.06 * row, f"{asked:.0e} m: {said}", transform=axes.transAxes,
+    for row, target in enumerate(TARGET_ERRORS):
+        axes.axvline(target, color="black", lw=0.7, ls=":")
+        text = _summary_text(result["recommended"][f"{target:g}"])
+        axes.text(0.0, 1.075 - 0.06 * row, f"{target:.0e} m: {text}", transform=axes.transAxes,
                   fontsize=7, color="#7a0a14")  # fmt: skip
 
 
-def _lowest(front: list[dict[str, Any]]) -> list[tuple[float, float]]:
-    """(error, time) that no other point beats in both."""
-    kept: list[tuple[float, float]] = []
-    for error, time in sorted(((p["sure_error_m"], p["cpu_ms"]) for p in front), reverse=True):
-        while kept and kept[-1][1] >= time:
-            kept.pop()
-        if error > 0:
-            kept.append((error, time))
-    return kept
-
-
-def _told(found: dict[str, Any]) -> str:
-    """mstmm's method for an error, and how it stands beside the best peer."""
-    own = found["tools"][OWN]
-    if "missed" in own:
+def _summary_text(recommended: dict[str, Any]) -> str:
+    """mstmm's method for an error, and its ratio to the best other program."""
+    own_point = recommended["tools"][OWN]
+    if "missed" in own_point:
         return "not met by mstmm"
-    text = f"{own['method']}, {own['manner']}, {own['cpu_ms']:.2g} ms"
-    if found["ratio"] is None:
+    text = f"{own_point['method']}, {own_point['variant']}, {own_point['cpu_ms']:.2g} ms"
+    if recommended["ratio"] is None:
         return f"{text}; by no peer"
-    return f"{text}; {found['ratio']:.2g} of {found['best_peer']}"
+    return f"{text}; {recommended['ratio']:.2g} of {recommended['best_peer']}"

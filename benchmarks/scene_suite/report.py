@@ -1,16 +1,18 @@
-"""The standing charts as a page: what to take for two errors, beside the best peer."""
+"""Page of the cost charts: recommended settings for two errors."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from .side_by_side import OWN
+from .comparison import OWN
 
 
-def words(point: dict[str, Any]) -> str:
-    """Method or tool, manner and setting of a point."""
-    value = f"step {point['value']:.2g} s" if point["fixed"] else f"rtol {point['value']:.0e}"
-    return ", ".join(part for part in (point["method"], point["manner"], value) if part)
+def setting_text(point: dict[str, Any]) -> str:
+    """Method or program, variant and setting of a point."""
+    value = (
+        f"step {point['value']:.2g} s" if point["has_fixed_steps"] else f"rtol {point['value']:.0e}"
+    )
+    return ", ".join(part for part in (point["method"], point["variant"], value) if part)
 
 
 _PAGE = """\
@@ -48,43 +50,44 @@ Pinocchio runs in a bare loop. For short motions this is the difference.
 
 def page(record: dict[str, Any], picture: str) -> str:
     """The whole page, with the picture at a path relative to it."""
-    at, results = record["machine"], record["results"]
+    machine, results = record["machine"], record["results"]
     return _PAGE.format(
-        picture=picture, rounds=record["rounds"], processor=at["processor"], cores=at["cores"],
-        load=at["load"], table=table(record), scenes="\n".join(map(scene, results)),
-        everybody="\n\n".join(map(everybody, results)),
+        picture=picture, rounds=record["rounds"], processor=machine["processor"],
+        cores=machine["cores"],
+        load=machine["load"], table=table(record), scenes="\n".join(map(scene, results)),
+        everybody="\n\n".join(map(all_programs, results)),
     )  # fmt: skip
 
 
 def table(record: dict[str, Any]) -> str:
-    """What to take for every scene and error."""
+    """Recommended settings for every scene and error."""
     lines = [
         "| scene | error | mstmm | CPU ms | best peer | CPU ms | mstmm / peer |", "|---" * 7 + "|",
     ]  # fmt: skip
     for result in record["results"]:
-        lines += [row(result, asked) for asked in result["recommended"]]
+        lines += [row(result, target) for target in result["recommended"]]
     return "\n".join(lines)
 
 
 def scene(result: dict[str, Any]) -> str:
-    """What was run, and who could not."""
+    """Scene, programs, and reasons of missing ones."""
     tools = ", ".join(tool for tool in result["fronts"] if tool != OWN) or "none"
     return (
         f"- **{result['case']}**: {result['title']}, {result['t_end_s']:g} s, error of "
-        f"`{result['of']}`; engines: {', '.join(result['engines'])}; the reference's own error is "
+        f"`{result['end']}`; engines: {', '.join(result['engines'])}; the reference's own error is "
         f"{result['reference']['error']:.1e} m; the shortest call of `simulate` takes "
         f"{result['shortest_call_ms']:.2g} ms. Peers: {tools}."
         + "".join(f" Left out: {why}." for why in result["missing"])
     )
 
 
-def row(result: dict[str, Any], asked: str) -> str:
+def row(result: dict[str, Any], target: str) -> str:
     """A line of the table."""
-    found = result["recommended"][asked]
-    own, peer = found["tools"][OWN], found["best_peer"]
-    cells = [result["case"], f"{float(asked):.0e} m", *cell(own)]
-    cells += cell(found["tools"][peer]) if peer else ["none meets it", ""]
-    cells.append("" if found["ratio"] is None else f"{found['ratio']:.3g}")
+    recommended = result["recommended"][target]
+    own_point, peer = recommended["tools"][OWN], recommended["best_peer"]
+    cells = [result["case"], f"{float(target):.0e} m", *cell(own_point)]
+    cells += cell(recommended["tools"][peer]) if peer else ["none meets it", ""]
+    cells.append("" if recommended["ratio"] is None else f"{recommended['ratio']:.3g}")
     return f"| {' | '.join(cells)} |"
 
 
@@ -92,19 +95,19 @@ def cell(point: dict[str, Any]) -> list[str]:
     """Words and CPU ms."""
     if "missed" in point:
         return ["none meets it", ""]
-    return [words(point), f"{point['cpu_ms']:.3g}"]
+    return [setting_text(point), f"{point['cpu_ms']:.3g}"]
 
 
-def everybody(result: dict[str, Any]) -> str:
-    """CPU ms of every tool for the errors that are asked."""
-    asked = list(result["recommended"])
+def all_programs(result: dict[str, Any]) -> str:
+    """CPU ms of all programs for all target errors."""
+    targets = list(result["recommended"])
     lines = [
         f"**{result['case']}**", "",
-        f"| tool | {' | '.join(f'{float(x):.0e} m' for x in asked)} |",
-        "|---" * (len(asked) + 1) + "|",
+        f"| tool | {' | '.join(f'{float(target):.0e} m' for target in targets)} |",
+        "|---" * (len(targets) + 1) + "|",
     ]  # fmt: skip
     for tool in result["fronts"]:
-        points = [result["recommended"][x]["tools"][tool] for x in asked]
-        texts = ["" if "missed" in p else f"{p['cpu_ms']:.3g} ({words(p)})" for p in points]
+        points = [result["recommended"][target]["tools"][tool] for target in targets]
+        texts = ["" if "missed" in p else f"{p['cpu_ms']:.3g} ({setting_text(p)})" for p in points]
         lines.append(f"| {tool} | {' | '.join(texts)} |")
     return "\n".join(lines)

@@ -30,13 +30,13 @@ def draw(record: dict[str, Any], path: Path) -> None:
     figure.subplots_adjust(left=0.34, right=0.96, top=0.92, bottom=0.17)
     values = [1e3 * min(record["results"][name]["cpu_s"]) for name in LABELS]
     colours = ["#c1121f" if "mstmm" in name else "#7f8c9a" for name in LABELS]
-    places = range(len(LABELS), 0, -1)
-    axes.barh(places, values, color=colours, height=0.68)
-    for place, value in zip(places, values, strict=True):
-        axes.text(value, place, f" {value:.0f}", va="center", fontsize=8)
-    axes.set_yticks(places, list(LABELS.values()))
+    positions = range(len(LABELS), 0, -1)
+    axes.barh(positions, values, color=colours, height=0.68)
+    for position, value in zip(positions, values, strict=True):
+        axes.text(value, position, f" {value:.0f}", va="center", fontsize=8)
+    axes.set_yticks(positions, list(LABELS.values()))
     axes.grid(axis="y", visible=False)
     axes.set_xlabel("CPU ms of a fresh process")
     axes.set_title("Start-up: imports, and the first result of a seven-body scene")
-    style.footer(figure, record, "Smallest of the rounds, children included.")
-    style.save(figure, path)
+    style.add_footer(figure, record, "Smallest of the rounds, children included.")
+    style.save_figure(figure, path)

@@ -3,8 +3,8 @@
     python benchmarks/startup/run.py [--quick] [--plot]
 
 Fresh processes in alternating rounds; CPU time (user and system, children included), so that a busy
-machine and threads of BLAS do not count.  "gcc alone" is the compiler on the text that the cold
-first result had it compile, with the same flags.
+machine and threads of BLAS do not count.  "gcc alone" is the compiler on the text of the cold
+first result, with the same flags.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ sys.path.insert(0, str(HERE.parent))
 
 from common import measure, scenes  # noqa: E402
 
-FIRST, CASADI = str(HERE / "first.py"), str(HERE / "first_casadi.py")
+FIRST, CASADI = str(HERE / "first_result.py"), str(HERE / "first_casadi_result.py")
 #: Ratio -> largest value allowed.
 TARGETS = {
     "import mstmm / import numpy": 1.2,
@@ -35,11 +35,11 @@ TARGETS = {
 }
 
 
-def spent(command: list[str], cache: Path) -> dict[str, float]:
+def process_times(command: list[str], cache: Path) -> dict[str, float]:
     """CPU and wall seconds of a process and its children."""
     environment = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
     environment["MSTMM_CACHE"] = str(cache)
-    begin = time.perf_counter()
+    start_time = time.perf_counter()
     process = subprocess.Popen(
         command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
     )
@@ -47,8 +47,8 @@ def spent(command: list[str], cache: Path) -> dict[str, float]:
     process.returncode = os.waitstatus_to_exitcode(status)
     if process.returncode:
         raise SystemExit(f"{' '.join(command)} ended with {process.returncode}")
-    wall = time.perf_counter() - begin
-    return {"cpu_s": usage.ru_utime + usage.ru_stime, "wall_s": wall}
+    wall_s = time.perf_counter() - start_time
+    return {"cpu_s": usage.ru_utime + usage.ru_stime, "wall_s": wall_s}
 
 
 def compiler(scene: dict[str, Any], folder: Path) -> list[str]:
@@ -61,54 +61,48 @@ def compiler(scene: dict[str, Any], folder: Path) -> list[str]:
     for name, text in sources.items():
         (folder / name).write_text(text)
     files = [str(folder / name) for name in sources if name.endswith(".c")]
-    return [
-        "gcc",
-        *COMPILER_FLAGS,
-        "-fPIC",
-        "-shared",
-        *files,
-        "-o",
-        str(folder / "alone.so"),
-        "-lm",
-    ]
+    output = str(folder / "alone.so")
+    return ["gcc", *COMPILER_FLAGS, "-fPIC", "-shared", *files, "-o", output, "-lm"]
 
 
 def commands(folder: Path) -> dict[str, Callable[[], dict[str, float]]]:
-    """What is timed: name -> one run."""
+    """Name -> function that runs and times a process."""
     scene, python = scenes.pins(7), sys.executable
     file, warm, cold = folder / "seven.json", folder / "warm", folder / "cold"
     file.write_text(json.dumps(scene))
-    for place in (warm, cold):
-        place.mkdir(mode=0o700)
-    first = [python, FIRST, str(file)]
-    spent([*first, "fused"], warm)
+    for cache in (warm, cold):
+        cache.mkdir(mode=0o700)
+    first_result = [python, FIRST, str(file)]
+    process_times([*first_result, "fused"], warm)
 
-    def emptied(command: list[str]) -> dict[str, float]:
+    def run_with_empty_cache(command: list[str]) -> dict[str, float]:
         shutil.rmtree(cold)
         cold.mkdir(mode=0o700)
-        return spent(command, cold)
+        return process_times(command, cold)
 
-    alone = compiler(scene, folder)
-    found: dict[str, Callable[[], dict[str, float]]] = {
-        "python": lambda: spent([python, "-c", "pass"], warm),
-        "mstmm, warm": lambda: spent([*first, "auto"], warm),
-        "mstmm, cold, fused": lambda: emptied([*first, "fused"]),
-        "mstmm, cold, auto": lambda: emptied([*first, "auto"]),
-        "gcc alone": lambda: spent(alone, warm),
-        "CasADi + CVODES, jit": lambda: spent([python, CASADI, str(file)], warm),
+    compiler_command = compiler(scene, folder)
+    runs: dict[str, Callable[[], dict[str, float]]] = {
+        "python": lambda: process_times([python, "-c", "pass"], warm),
+        "mstmm, warm": lambda: process_times([*first_result, "auto"], warm),
+        "mstmm, cold, fused": lambda: run_with_empty_cache([*first_result, "fused"]),
+        "mstmm, cold, auto": lambda: run_with_empty_cache([*first_result, "auto"]),
+        "gcc alone": lambda: process_times(compiler_command, warm),
+        "CasADi + CVODES, jit": lambda: process_times([python, CASADI, str(file)], warm),
     }
     for module in ("numpy", "mstmm", "casadi", "pinocchio", "mujoco", "pydrake.all", "exudyn"):
-        found[f"import {module}"] = lambda m=module: spent([python, "-c", f"import {m}"], warm)
-    return found
+        runs[f"import {module}"] = lambda m=module: process_times(
+            [python, "-c", f"import {m}"], warm
+        )
+    return runs
 
 
 def ratios(results: dict[str, dict[str, list[float]]]) -> dict[str, float]:
-    """The targets' ratios, of smallest CPU times."""
-    low = {name: min(values["cpu_s"]) for name, values in results.items()}
-    numpy = low["import numpy"]
-    allowed = 3 * numpy + 1.5 * low["gcc alone"]
-    values = (low["import mstmm"] / numpy, low["mstmm, warm"] / numpy,
-              low["mstmm, cold, fused"] / allowed)  # fmt: skip
+    """Ratios with targets, of minimum CPU times."""
+    least = {name: min(values["cpu_s"]) for name, values in results.items()}
+    numpy = least["import numpy"]
+    cold_limit = 3 * numpy + 1.5 * least["gcc alone"]
+    values = (least["import mstmm"] / numpy, least["mstmm, warm"] / numpy,
+              least["mstmm, cold, fused"] / cold_limit)  # fmt: skip
     return dict(zip(TARGETS, values, strict=True))
 
 
@@ -116,8 +110,8 @@ def table(results: dict[str, dict[str, list[float]]]) -> str:
     """Markdown: smallest and median CPU ms, median wall ms; then the ratios."""
     lines = ["| process | CPU ms, min | CPU ms, median | wall ms, median |", "|---" * 4 + "|"]
     for name, values in results.items():
-        cpu, wall = values["cpu_s"], values["wall_s"]
-        cells = (min(cpu), statistics.median(cpu), statistics.median(wall))
+        cpu_s, wall_s = values["cpu_s"], values["wall_s"]
+        cells = (min(cpu_s), statistics.median(cpu_s), statistics.median(wall_s))
         lines.append(f"| {name} | {' | '.join(f'{1e3 * x:.0f}' for x in cells)} |")
     lines += ["", "| ratio | measured | target |", "|---" * 3 + "|"]
     for name, value in ratios(results).items():
@@ -127,7 +121,7 @@ def table(results: dict[str, dict[str, list[float]]]) -> str:
 
 def main() -> None:
     """Measure, print the table, draw."""
-    parser = measure.options(str(__doc__).splitlines()[0], HERE)
+    parser = measure.option_parser(str(__doc__).splitlines()[0], HERE)
     parser.add_argument("--rounds", type=int, default=9)
     options = parser.parse_args()
     if not options.plot:
@@ -136,16 +130,15 @@ def main() -> None:
             results: dict[str, dict[str, list[float]]] = {
                 name: {"cpu_s": [], "wall_s": []} for name in work
             }
-            for turn in range(1 + (2 if options.quick else options.rounds)):
-                for name, once in work.items():
-                    for key, value in once().items():
-                        if turn:  # the first round writes byte code and fills the disk's cache
+            for round_index in range(1 + (2 if options.quick else options.rounds)):
+                for name, run in work.items():
+                    for key, value in run().items():
+                        if (
+                            round_index
+                        ):  # the first round writes byte code and fills the disk's cache
                             results[name][key].append(round(value, 5))
-        measure.save(options.json, results)
-    record = json.loads(options.json.read_text())
-    text = table(record["results"])
-    print(text)
-    options.json.with_suffix(".md").write_text(text + "\n")
+        measure.save_record(options.json, results)
+    record = measure.write_table(options.json, table)
     from picture import draw
 
     draw(record, options.picture)

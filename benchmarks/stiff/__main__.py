@@ -1,12 +1,12 @@
-"""Stiff motions: CPU time and work against achieved error, mstmm's methods beside their peers.
+"""Stiff motions: CPU time and work over achieved error, compared with other programs.
 
     python -m benchmarks.stiff [CASE ...] [--methods NAMES] [--quick] [--plot] [--references]
 
-Every contestant runs every case from loose to tight settings; the error is the largest distance (m)
-of a watched end from where it should be at the end (`references.py`).  Counted is the cheapest
-setting that meets an error and all of whose tighter ones meet it too.  Runs of all contestants
-alternate in one process; times are CPU times of one whole warm call, the minimum counts.  Points
-whose evaluations, residuals, tangents and solves are known are also counted in evaluations.
+All programs run each case from loose to tight settings.  The error is the largest distance (m) of
+an end from its reference position at the end (`references.py`).  The cheapest setting counts that
+meets an error and whose tighter settings meet it too.  Runs of all programs alternate in one
+process; times are minimum CPU times of one whole warm call.  Work is also given in evaluations
+where a program counts evaluations, residuals, tangents and solves.
 """
 
 from __future__ import annotations
@@ -24,102 +24,108 @@ import numpy as np
 from ..common import measure
 from . import programs, references
 from .cases import CASES, Case
-from .counting import cheapest, evaluations, milliseconds
+from .cost_measure import cheapest, evaluations, milliseconds
 
 HERE = Path(__file__).resolve().parent
-ASKED = (1e-2, 1e-3, 1e-4, 1e-6, 1e-8)
+TARGET_ERRORS = (1e-2, 1e-3, 1e-4, 1e-6, 1e-8)
 
 
 @cache
-def say(what: str) -> None:
+def print_once(message: str) -> None:
     """Print it, the first time."""
-    print(what, flush=True)
+    print(message, flush=True)
 
 
-def measured(case: Case, options: Namespace) -> dict[str, Any]:
+def measure_case(case: Case, options: Namespace) -> dict[str, Any]:
     """All curves of one case, timed in alternating rounds."""
-    exact, apart = references.load(case)
-    curves = programs.of_case(case, options.methods.split(","), say)
-    found = []
+    reference, reference_difference = references.load_reference(case)
+    curves = programs.case_curves(case, options.methods.split(","), print_once)
+    evaluated = []
     for curve in curves:
-        points = list(tried(curve, exact, options))
-        found.append({"tool": curve.tool, "manner": curve.manner, "points": points})
-        print(case.name, curve.tool, curve.manner, len(points), "settings", flush=True)
-    timed = [
+        points = list(evaluate_curve(curve, reference, options))
+        evaluated.append({"tool": curve.tool, "variant": curve.variant, "points": points})
+        print(case.name, curve.tool, curve.variant, len(points), "settings", flush=True)
+    timed_points = [
         (point, dict(curve.settings)[point["tolerance"]])
-        for curve, kept in zip(curves, found, strict=True)
-        for point in kept["points"]
+        for curve, entry in zip(curves, evaluated, strict=True)
+        for point in entry["points"]
         if "error_m" in point
     ]
     for _ in range(options.rounds):
-        for point, run in timed:
+        for point, run in timed_points:
             if sum(point["cpu_ms"]) < 1e3 * options.budget:
-                point["cpu_ms"].append(round(1e3 * measure.once(run), 4))
+                point["cpu_ms"].append(round(1e3 * measure.call_time(run), 4))
     return {"case": case.name, "title": case.title, "t_end_s": case.t_end,
-            "reference_apart_m": apart, "curves": found}  # fmt: skip
+            "date": measure.machine()["date"],
+            "reference_difference_m": reference_difference, "curves": evaluated}  # fmt: skip
 
 
-def tried(curve: programs.Curve, exact: np.ndarray, options: Namespace) -> Iterator[dict[str, Any]]:
-    """One point per setting, up to the first that takes longer than allowed (loose ones may, where
-    they struggle) or the second that nobody asks to be so accurate."""
-    accurate = 0
-    for number, (tolerance, run) in enumerate(list(curve.settings)[:: 4 if options.quick else 1]):
+def evaluate_curve(
+    curve: programs.Curve, reference: np.ndarray, options: Namespace
+) -> Iterator[dict[str, Any]]:
+    """One point per setting, up to the first beyond the time limit (loose ones may exceed it) or
+    the second that is more accurate than all targets."""
+    accurate_count = 0
+    for index, (tolerance, run) in enumerate(list(curve.settings)[:: 4 if options.quick else 1]):
         try:
-            box: list[programs.Outcome] = []
-            spent = measure.cpu(lambda run=run, box=box: box.append(run()))
-            look, counts = box[0]
-            error = float(np.linalg.norm(look() - exact, axis=1).max())
-        except Exception as failure:  # one that gives up is a result too
+            outcomes: list[programs.Outcome] = []
+            cpu_s = measure.cpu_time(lambda run=run, outcomes=outcomes: outcomes.append(run()))
+            read_positions, counts = outcomes[0]
+            error = float(np.linalg.norm(read_positions() - reference, axis=1).max())
+        except Exception as failure:  # a failed run is a result too
             text = (str(failure).strip().splitlines() or [type(failure).__name__])[0]
             yield {"tolerance": tolerance, "failure": text[:120]}
             continue
         if not np.isfinite(error):
-            yield {"tolerance": tolerance, "failure": "places that are not numbers"}
+            yield {"tolerance": tolerance, "failure": "positions not finite"}
             continue
         yield {"tolerance": tolerance, "error_m": float(f"{error:.4g}"), "counts": counts,
-               "cpu_ms": [round(1e3 * spent, 4)]}  # fmt: skip
-        accurate = accurate + 1 if error < min(ASKED) / 10 else 0
-        if accurate == 2 or (number > 1 and spent > options.limit):
+               "cpu_ms": [round(1e3 * cpu_s, 4)]}  # fmt: skip
+        accurate_count = accurate_count + 1 if error < min(TARGET_ERRORS) / 10 else 0
+        if accurate_count == 2 or (index > 1 and cpu_s > options.limit):
             return
 
 
-def tools(result: dict[str, Any]) -> dict[str, list[dict[str, Any]]]:
+def curves_of_tools(result: dict[str, Any]) -> dict[str, list[dict[str, Any]]]:
     """Tool -> its curves."""
-    found: dict[str, list[dict[str, Any]]] = {}
+    curves_by_tool: dict[str, list[dict[str, Any]]] = {}
     for curve in result["curves"]:
-        found.setdefault(curve["tool"], []).append(curve)
-    return found
+        curves_by_tool.setdefault(curve["tool"], []).append(curve)
+    return curves_by_tool
 
 
 def table(results: list[dict[str, Any]]) -> str:
-    """Markdown: for every error asked, each tool's cheapest CPU ms (and evaluations)."""
+    """Markdown: CPU ms (and evaluations) of the cheapest setting, by program and error."""
     lines = []
     for result in results:
         lines += [
-            f"**{result['case']}**: {result['title']}, {result['t_end_s']:g} s", "",
-            "| tool | " + " | ".join(f"{asked:.0e} m" for asked in ASKED) + " |",
-            "|---" * (len(ASKED) + 1) + "|",
+            f"**{result['case']}**: {result['title']}, {result['t_end_s']:g} s, "
+            f"measured {result['date']}", "",
+            "| tool | " + " | ".join(f"{target:.0e} m" for target in TARGET_ERRORS) + " |",
+            "|---" * (len(TARGET_ERRORS) + 1) + "|",
         ]  # fmt: skip
-        for tool, curves in tools(result).items():
-            cells = [cell(curves, asked) for asked in ASKED]
+        for tool, curves in curves_of_tools(result).items():
+            cells = [cell(curves, target) for target in TARGET_ERRORS]
             lines.append(f"| {tool} | " + " | ".join(cells) + " |")
         lines.append("")
     return "\n".join(lines)
 
 
-def cell(curves: list[dict[str, Any]], asked: float) -> str:
-    """CPU ms and, in brackets, evaluations of the cheapest point of these curves that counts."""
-    points = [p for curve in curves if (p := cheapest(curve["points"], asked)) is not None]
+def cell(curves: list[dict[str, Any]], target: float) -> str:
+    """CPU ms, and evaluations in brackets, of the cheapest accurate point."""
+    points = [p for curve in curves if (p := cheapest(curve["points"], target)) is not None]
     if not points:
         return ""
-    best = min(points, key=milliseconds)
-    work = evaluations(best)
-    return f"{milliseconds(best):.3g}" + (f" ({work:.0f} E)" if work is not None else "")
+    fastest = min(points, key=milliseconds)
+    evaluation_count = evaluations(fastest)
+    return f"{milliseconds(fastest):.3g}" + (
+        f" ({evaluation_count:.0f} E)" if evaluation_count is not None else ""
+    )
 
 
-def arguments() -> ArgumentParser:
-    """What the command understands."""
-    parser = measure.options(str(__doc__).splitlines()[0], HERE)
+def command_parser() -> ArgumentParser:
+    """Parser of the command line."""
+    parser = measure.option_parser(str(__doc__).splitlines()[0], HERE)
     parser.prog = "python -m benchmarks.stiff"
     parser.add_argument("case", nargs="*", help=f"of {', '.join(CASES)}; all unless given")
     parser.add_argument("--methods", default=",".join(programs.METHODS), help="mstmm's, by name")
@@ -133,27 +139,24 @@ def arguments() -> ArgumentParser:
 
 def main() -> None:
     """Measure, print the table, draw."""
-    parser = arguments()
+    parser = command_parser()
     options = parser.parse_args()
     if unknown := [name for name in options.case if name not in CASES]:
         parser.error(f"no case {unknown[0]!r}; there are {', '.join(CASES)}")
     names = options.case or list(CASES)
     if options.references:
-        references.write(names)
+        references.write_references(names)
         return
     if not options.plot:
-        warnings.simplefilter("ignore")  # of integrators that struggle
-        kept = {}
+        warnings.simplefilter("ignore")  # of integrators with difficulties
+        stored = {}
         if options.json.exists():
-            kept = {r["case"]: r for r in json.loads(options.json.read_text())["results"]}
+            stored = {r["case"]: r for r in json.loads(options.json.read_text())["results"]}
         for name in names:
-            kept[name] = measured(CASES[name], options)
-            results = [kept[name] for name in CASES if name in kept]
-            measure.save(options.json, results, unit="CPU ms of one run")
-    record = json.loads(options.json.read_text())
-    text = table(record["results"])
-    print(text)
-    options.json.with_suffix(".md").write_text(text)
+            stored[name] = measure_case(CASES[name], options)
+            results = [stored[name] for name in CASES if name in stored]
+            measure.save_record(options.json, results, unit="CPU ms of one run")
+    record = measure.write_table(options.json, table)
     from .picture import draw
 
     draw(record, options.picture)

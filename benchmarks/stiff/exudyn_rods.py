@@ -1,7 +1,7 @@
 """Exudyn's generalised-alpha on rods in a row: on bushings, and on pins with dampers.
 
 Planar rigid bodies in absolute coordinates with sparse matrices; springs between markers, or
-constraints.  Whatever costs time without being asked for is off: files, sensors, output, threads.
+constraints.  Files, sensors, output and threads are switched off.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ HALF, MASS, INERTIA, GRAVITY = 0.5, 1.0, 1 / 12, 9.81  # m, kg, kg m2, m/s2
 
 
 @dataclass(frozen=True)
-class Manner:
-    """How a run is made: `radius` of the damping at infinity; `newton` is "full", "modified" (a new
-    Jacobian when convergence is slow) or "once a step"; its tolerance, relative and absolute."""
+class Variant:
+    """Variant of the method: `radius` of the damping at infinity; `newton` is "full", "modified" (a
+    new Jacobian when convergence is slow) or "once a step"; tolerance, relative and absolute."""
 
     radius: float
     newton: str
@@ -53,8 +53,10 @@ class Rods:
         self.container = exu.SystemContainer()
         self.system = mbs = self.container.AddSystem()
         ground = mbs.AddObject(ObjectGround())
-        carrier = mbs.AddMarker(MarkerBodyPosition(bodyNumber=ground, localPosition=[0, 0, 0]))
-        still = mbs.AddMarker(
+        parent_marker = mbs.AddMarker(
+            MarkerBodyPosition(bodyNumber=ground, localPosition=[0, 0, 0])
+        )
+        inboard_rotation = mbs.AddMarker(
             MarkerNodeCoordinate(nodeNumber=mbs.AddNode(NodePointGround()), coordinate=0)
         )
         self.nodes = []
@@ -65,11 +67,11 @@ class Rods:
             )
             mass = mbs.AddMarker(MarkerBodyMass(bodyNumber=rod))
             mbs.AddLoad(Gravity(markerNumber=mass, loadVector=[0, -GRAVITY, 0]))
-            inner, outer = (
+            inboard, outboard = (
                 mbs.AddMarker(MarkerBodyPosition(bodyNumber=rod, localPosition=[x, 0, 0]))
                 for x in (-HALF, HALF)
             )
-            pair = [carrier, inner]
+            pair = [parent_marker, inboard]
             if bushings is None:
                 mbs.AddObject(ObjectJointRevolute2D(markerNumbers=pair))
             else:
@@ -80,28 +82,30 @@ class Rods:
                         markerNumbers=pair, stiffness=[k, k, 0], damping=[c, c, 0]
                     )
                 )
-            turn = mbs.AddMarker(MarkerNodeCoordinate(nodeNumber=node, coordinate=2))
+            rotation = mbs.AddMarker(MarkerNodeCoordinate(nodeNumber=node, coordinate=2))
             if damper:
                 mbs.AddObject(
-                    CoordinateSpringDamper(markerNumbers=[still, turn], stiffness=0, damping=damper)
+                    CoordinateSpringDamper(
+                        markerNumbers=[inboard_rotation, rotation], stiffness=0, damping=damper
+                    )
                 )
-            carrier, still = outer, turn
+            parent_marker, inboard_rotation = outboard, rotation
             self.nodes.append(node)
         mbs.Assemble()
 
     def run(
-        self, t_end: float, steps: int, manner: Manner
+        self, t_end: float, steps: int, variant: Variant
     ) -> tuple[Callable[[], Array], dict[str, int]]:
-        """How to get the tips at t_end after so many equal steps, and what it took."""
+        """Function that returns the tips at t_end after `steps` equal steps, and counts."""
         settings = exu.SimulationSettings()
         integration = settings.timeIntegration
         integration.numberOfSteps, integration.endTime = steps, t_end
         integration.adaptiveStep = False
-        integration.generalizedAlpha.spectralRadius = manner.radius
+        integration.generalizedAlpha.spectralRadius = variant.radius
         newton = integration.newton
-        newton.relativeTolerance, newton.absoluteTolerance = manner.tolerance
-        newton.useModifiedNewton = manner.newton != "full"
-        newton.modifiedNewtonJacUpdatePerStep = manner.newton == "once a step"
+        newton.relativeTolerance, newton.absoluteTolerance = variant.tolerance
+        newton.useModifiedNewton = variant.newton != "full"
+        newton.modifiedNewtonJacUpdatePerStep = variant.newton == "once a step"
         integration.verboseMode = 0
         settings.solution.file.write = False
         settings.solution.sensors.active = False
@@ -111,9 +115,9 @@ class Rods:
         solver: Any = exu.MainSolverImplicitSecondOrder()  # its stubs lack arguments
         if not solver.SolveSystem(self.system, settings):
             raise RuntimeError("Newton's method did not converge")
-        found = solver.it
-        counts = {"steps": steps, "newton_steps": int(found.newtonStepsCount),
-                  "jacobians": int(found.newtonJacobiCount)}  # fmt: skip
+        counters = solver.it
+        counts = {"steps": steps, "newton_steps": int(counters.newtonStepsCount),
+                  "jacobians": int(counters.newtonJacobiCount)}  # fmt: skip
         return self.tips, counts
 
     def tips(self) -> Array:

@@ -9,10 +9,10 @@ import matplotlib.pyplot as plt
 from matplotlib.lines import Line2D
 
 from ..common import style
-from .counting import frontier, milliseconds
+from .cost_measure import frontier, milliseconds
 
 #: Explicit methods orange, implicit ones of mstmm in strong colours, peers grey and blue, dashed.
-LOOKS: dict[str, dict[str, Any]] = {
+LINE_STYLES: dict[str, dict[str, Any]] = {
     "dop853": {"color": "#f4791f", "marker": "s", "lw": 1.3},
     "dopri5": {"color": "#f6b26b", "marker": "s", "lw": 1.1, "mfc": "white"},
     "auto": {"color": "#111111", "marker": "*", "lw": 1.4, "zorder": 6},
@@ -57,40 +57,37 @@ def draw(record: dict[str, Any], path: Path) -> None:
     for axes in panels.flat[max(0, len(results) - columns) : len(results)]:
         axes.set_xlabel("error at the end, m (more accurate to the right)")
         axes.tick_params(labelbottom=True)
-    shown = [t for t in LOOKS if any(c["tool"] == t for r in results for c in r["curves"])]
-    handles = [Line2D([], [], label=tool, **LOOKS[tool]) for tool in shown]
+    tools = [t for t in LINE_STYLES if any(c["tool"] == t for r in results for c in r["curves"])]
+    handles = [Line2D([], [], label=tool, **LINE_STYLES[tool]) for tool in tools]
     figure.legend(handles=handles, loc="upper center", ncol=min(9, len(handles)), fontsize=8.5)
-    style.footer(
+    style.add_footer(
         figure, record,
         "Minimum CPU time of warm runs; a point counts if all tighter settings are as accurate.",
     )  # fmt: skip
-    style.save(figure, path)
+    style.save_figure(figure, path)
 
 
 def _panel(axes: Any, result: dict[str, Any]) -> None:
-    """The cheapest settings of every tool, over all its manners."""
-    for tool, looks in LOOKS.items():
+    """The cheapest settings of every tool, over all its variants."""
+    for tool, look in LINE_STYLES.items():
         curves = [c["points"] for c in result["curves"] if c["tool"] == tool]
-        found = _lowest([
+        front = _visible_front([
             (float(p["error_m"]), milliseconds(p)) for points in curves for p in frontier(points)
         ])  # fmt: skip
-        if found:
-            axes.plot(*zip(*found, strict=True), **looks)
-            first = found[0]  # what is less accurate costs as much: no cheaper setting is known
-            axes.plot([ERRORS[0], first[0]], [first[1]] * 2, color=looks["color"], lw=0.8, ls=":")
+        if front:
+            axes.plot(*zip(*front, strict=True), **look)
+            loosest = front[0]  # no cheaper setting is known for larger errors
+            axes.plot(
+                [ERRORS[0], loosest[0]], [loosest[1]] * 2, color=look["color"], lw=0.8, ls=":"
+            )
     axes.set(xscale="log", yscale="log", xlim=ERRORS)
     axes.xaxis.minorticks_off()
     axes.set_title(result["title"], fontsize=9)
 
 
-def _lowest(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """(error, time) that no other point beats in both, within the panel and one beyond it."""
-    kept: list[tuple[float, float]] = []
-    for error, time in sorted(points, reverse=True):
-        while kept and kept[-1][1] >= time:
-            kept.pop()
-        kept.append((error, time))
-    left, right = ERRORS
-    within = [p for p in kept if right <= p[0] < 3 * left]
-    beyond = [(right / 3, time) for error, time in kept if error < right]
-    return within + beyond[:1]
+def _visible_front(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Pareto front within the panel and one point beyond it."""
+    front, (left, right) = style.pareto_front(points), ERRORS
+    inside = [p for p in front if right <= p[0] < 3 * left]
+    outside = [(right / 3, time) for error, time in front if error < right]
+    return inside + outside[:1]

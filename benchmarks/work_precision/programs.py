@@ -1,4 +1,4 @@
-"""Who integrates the two scenes, and how: label -> setting -> run that returns q at the end."""
+"""Programs and their settings: label -> setting -> run that returns q at the end."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ Settings = dict[str, Run]
 TOLERANCES = [10.0**-k for k in np.arange(4, 14.01, 0.5)]
 
 
-def start(scene: dict[str, Any]) -> tuple[np.ndarray, np.ndarray]:
-    """q and u at the start, as the scene gives them."""
+def initial_state(scene: dict[str, Any]) -> tuple[np.ndarray, np.ndarray]:
+    """Initial q and u of a scene."""
     hinges = [hinge["initial"] for hinge in scene["hinge"]]
     return tuple(np.concatenate([np.asarray(h[x], float) for h in hinges]) for x in ("q", "u"))
 
 
 def mstmm_runs(scene: dict[str, Any], t_end: float) -> Settings:
-    """The whole call of `simulate`, one sample at the end."""
+    """Whole calls of `simulate` with one output time, the end."""
     model = mstmm.compile(mstmm.Scene(**scene), engine="fused")
 
     def run(tolerance: float, method: str) -> np.ndarray:
@@ -39,22 +39,22 @@ def mstmm_runs(scene: dict[str, Any], t_end: float) -> Settings:
             for method in ("dop853", "pirk13") for t in TOLERANCES}  # fmt: skip
 
 
-def native_runs(found: dict[str, Any], t_end: float, count: int) -> Settings:
-    """DOP853 in C around functions; of several builds the one that runs fastest now."""
-    name = min(found, key=lambda k: min(found[k].time(True, 2000) for _ in range(5)))
-    subject = found[name]
+def dop853_runs(subjects: dict[str, Any], t_end: float, count: int) -> Settings:
+    """DOP853 in C around the fastest of several builds of a function."""
+    name = min(subjects, key=lambda k: min(subjects[k].time(True, 2000) for _ in range(5)))
+    subject = subjects[name]
     return {f"{name} {t:.1e}": lambda t=t: dop853.run(subject, t_end, t)[0][:count]
             for t in TOLERANCES}  # fmt: skip
 
 
 def cvodes_runs(tree: Tree, q: np.ndarray, u: np.ndarray, t_end: float) -> Settings:
-    """CasADi's integrator on the same function with literals, compiled by it (jit)."""
+    """CasADi's CVODES on the same function with literals, compiled just in time."""
     function, _ = aba.articulated_body(tree, baked=True)
     x = ca.SX.sym("x", tree.nq + tree.nu)
     rates = function(ca.SX(0, 1), x[: tree.nq], x[tree.nq :], ca.SX.zeros(tree.nu))
     problem = {"x": x, "ode": ca.vertcat(*rates)}
     state = ca.DM(np.concatenate([q, u]))
-    found: Settings = {}
+    runs: Settings = {}
     for tolerance in [10.0**-k for k in (4, 5, 6, 7, 8, 9, 10, 10.5, 11, 11.5, 12, 12.5, 13)]:
         options = {
             "abstol": tolerance, "reltol": tolerance, "linear_multistep_method": "adams",
@@ -63,19 +63,19 @@ def cvodes_runs(tree: Tree, q: np.ndarray, u: np.ndarray, t_end: float) -> Setti
             "jit_options": {"flags": ["-O3", "-march=native"], "verbose": False},
         }  # fmt: skip
         solver = ca.integrator("run", "cvodes", problem, 0.0, t_end, options)
-        found[f"{tolerance:.1e}"] = lambda s=solver: np.array(s(x0=state)["xf"]).ravel()
-    return found
+        runs[f"{tolerance:.1e}"] = lambda s=solver: np.array(s(x0=state)["xf"]).ravel()
+    return runs
 
 
 def mujoco_runs(tree: Tree, q: np.ndarray, u: np.ndarray, t_end: float) -> Settings:
-    """Its own RK4, everything but smooth dynamics switched off."""
+    """MuJoCo's RK4 with smooth dynamics only."""
     peer = mujoco_peer.MujocoRun(tree)
     counts = [int(t_end * 10**k) for k in np.arange(2, 4.01, 0.25)]
     return {f"RK4 h = {t_end / n:.1e}": lambda n=n: peer.run(q, u, t_end, n) for n in counts}
 
 
 def exudyn_runs(tree: Tree, q: np.ndarray, u: np.ndarray, t_end: float) -> Settings:
-    """Its explicit methods in minimal coordinates."""
+    """Exudyn's explicit methods in minimal coordinates."""
     import exudyn as exu
     from common import exudyn_peer
 
@@ -83,56 +83,57 @@ def exudyn_runs(tree: Tree, q: np.ndarray, u: np.ndarray, t_end: float) -> Setti
 
     def run(method: Any, steps: int, tolerance: float) -> np.ndarray:
         peer.run(t_end, steps, method, tolerance)
-        return exudyn_peer.coordinates(tree, peer.end()[0])
+        return exudyn_peer.coordinates(tree, peer.end_state()[0])
 
-    kinds = exu.DynamicSolverType
-    found = {
-        f"RK67 h = {t_end / n:.1e}": lambda n=n: run(kinds.RK67, n, 0.0)
+    solver_types = exu.DynamicSolverType
+    runs = {
+        f"RK67 h = {t_end / n:.1e}": lambda n=n: run(solver_types.RK67, n, 0.0)
         for n in (int(t_end * 10**k) for k in np.arange(1.5, 3.76, 0.25))
     }
     for tolerance in TOLERANCES[:-2:2]:
-        found[f"DOPRI5 {tolerance:.0e}"] = lambda t=tolerance: run(kinds.DOPRI5, 20, t)
-    return found
+        runs[f"DOPRI5 {tolerance:.0e}"] = lambda t=tolerance: run(solver_types.DOPRI5, 20, t)
+    return runs
 
 
 def drake_runs(tree: Tree, q: np.ndarray, u: np.ndarray, t_end: float) -> Settings:
-    """Its Runge-Kutta of fifth order with error control (a ball has angles there)."""
+    """Drake's fifth-order Runge-Kutta method with error control; its balls have angles."""
     from common import drake_peer, exudyn_peer
 
-    own_q, own_u = exudyn_peer.state(tree, q, u)
-    balls = len(own_q) != len(q)
-    if balls:
-        own_q = own_q.reshape(-1, 3)[:, ::-1].ravel()
-        own_u = drake_peer.inboard_speeds(own_q, u)
-    found: Settings = {}
+    exudyn_q, exudyn_u = exudyn_peer.exudyn_state(tree, q, u)
+    has_balls = len(exudyn_q) != len(q)
+    if has_balls:
+        exudyn_q = exudyn_q.reshape(-1, 3)[:, ::-1].ravel()
+        exudyn_u = drake_peer.inboard_speeds(exudyn_q, u)
+    runs: Settings = {}
     for tolerance in [10.0**-k for k in (*range(3, 13), 12.5, 13)]:
-        peer = drake_peer.DrakeRun(tree, own_q, own_u, t_end / 100, "runge_kutta5", tolerance)
+        peer = drake_peer.DrakeRun(tree, exudyn_q, exudyn_u, t_end / 100, "runge_kutta5", tolerance)
 
         def run(peer: Any = peer) -> np.ndarray:
             peer.run(100)
-            end = peer.plant.GetPositions(peer.context)
-            if balls:
-                end = end.reshape(-1, 3)[:, ::-1].ravel()
-            return exudyn_peer.coordinates(tree, end)
+            q_end = peer.plant.GetPositions(peer.context)
+            if has_balls:
+                q_end = q_end.reshape(-1, 3)[:, ::-1].ravel()
+            return exudyn_peer.coordinates(tree, q_end)
 
-        found[f"RK5 {tolerance:.0e}"] = run
-    return found
+        runs[f"RK5 {tolerance:.0e}"] = run
+    return runs
 
 
-def all_of(
+def all_settings(
     scene: dict[str, Any], tree: Tree, q: np.ndarray, u: np.ndarray, t_end: float
 ) -> dict[str, Settings]:
-    """Everybody."""
-    one_q, one_u = q[None], u[None]
-    casadi = casadi_peer.subjects(tree, one_q, one_u, baked=True, sines=("", "libm"))
-    pinocchio = pinocchio_peer.subjects(tree, one_q, one_u, rates=True)
-    turned = native_runs(pinocchio, t_end, len(q))
+    """Settings of all programs."""
+    q_rows, u_rows = q[None], u[None]
+    casadi = casadi_peer.subjects(tree, q_rows, u_rows, baked=True, sines=("", "libm"))
+    pinocchio = pinocchio_peer.subjects(tree, q_rows, u_rows, rates=True)
+    pinocchio_runs = dop853_runs(pinocchio, t_end, len(q))
     return {
         "mstmm": mstmm_runs(scene, t_end),
         "CasADi + CVODES": cvodes_runs(tree, q, u, t_end),
-        "CasADi C + DOP853": native_runs(casadi, t_end, len(q)),
+        "CasADi C + DOP853": dop853_runs(casadi, t_end, len(q)),
         "Pinocchio + DOP853": {
-            k: lambda r=r: pinocchio_peer.back(tree, r()) for k, r in turned.items()
+            k: lambda r=r: pinocchio_peer.scene_coordinates(tree, r())
+            for k, r in pinocchio_runs.items()
         },
         "MuJoCo": mujoco_runs(tree, q, u, t_end),
         "Drake": drake_runs(tree, q, u, t_end),

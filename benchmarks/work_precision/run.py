@@ -2,14 +2,13 @@
 
     python benchmarks/work_precision/run.py [--quick] [--plot]
 
-Everybody runs from the same start to t = 10 s over a range of tolerances or step sizes; the error
-is the largest angle by which a hinge is off at the end, against CasADi's equations integrated in
-long double.  CPU time of the whole process for one warm run, everything set up; minimum counts.
+All programs start from the same state and run to t = 10 s over a range of tolerances or step sizes.
+The error is the largest angle error of a hinge at the end, against CasADi's equations integrated
+in long double.  CPU time of the whole process for one warm run without set-up; the minimum counts.
 """
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -20,112 +19,108 @@ import numpy as np
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
 
-import contestants  # noqa: E402
+import programs  # noqa: E402
 from common import measure, reference, scenes  # noqa: E402
-from common.links import COORDINATES, Tree, links_of  # noqa: E402
+from common.links import COORDINATES, Tree, link_tree  # noqa: E402
 
 T_END = 10.0
 SCENES = {"arm": scenes.swinging_arm, "balls": scenes.swinging_balls}
-ASKED = 1e-9
+TARGET_ERROR = 1e-9
 
 
-def error(tree: Tree, q: np.ndarray, exact: np.ndarray) -> float:
-    """Largest angle (rad) between where a hinge is and where it should be."""
-    worst, at = 0.0, 0
+def angle_error(tree: Tree, q: np.ndarray, exact: np.ndarray) -> float:
+    """Largest error of a hinge angle, rad."""
+    largest, offset = 0.0, 0
     for link in tree.links:
         size = COORDINATES[link.kind][0]
-        a, b = q[at : at + size], exact[at : at + size]
-        at += size
+        a, b = q[offset : offset + size], exact[offset : offset + size]
+        offset += size
         if link.kind == "pin":
-            worst = max(worst, abs(float(a[0] - b[0])))
+            largest = max(largest, abs(float(a[0] - b[0])))
         else:
             a, b = a / np.linalg.norm(a), b / np.linalg.norm(b)
             chord = min(np.linalg.norm(a - b), np.linalg.norm(a + b))
-            worst = max(worst, 4 * float(np.arcsin(min(1.0, chord / 2))))
-    return worst
+            largest = max(largest, 4 * float(np.arcsin(min(1.0, chord / 2))))
+    return largest
 
 
-def measured(name: str, rounds: int, quick: bool) -> dict[str, Any]:
-    """Curve of every contestant on one scene."""
+def measure_scene(name: str, rounds: int, quick: bool) -> dict[str, Any]:
+    """Work-precision curves of all programs on one scene."""
     scene = SCENES[name]()
-    tree = links_of(scene)
-    q, u = contestants.start(scene)
+    tree = link_tree(scene)
+    q, u = programs.initial_state(scene)
     exact = reference.end_state(tree, q, u, T_END, 400_000)
-    check = reference.end_state(tree, q, u, T_END, 200_000)
+    coarse = reference.end_state(tree, q, u, T_END, 200_000)
     runs: dict[str, Callable[[], np.ndarray]] = {}
-    for label, settings in contestants.all_of(scene, tree, q, u, T_END).items():
-        chosen = list(settings.items())
-        for setting, run in chosen[:: 3 if quick else 1]:
+    for label, settings in programs.all_settings(scene, tree, q, u, T_END).items():
+        all_runs = list(settings.items())
+        for setting, run in all_runs[:: 3 if quick else 1]:
             runs[f"{label}|{setting}"] = run
     curves: dict[str, dict[str, Any]] = {}
-    timed: dict[str, Callable[[], float]] = {}
+    timed_runs: dict[str, Callable[[], float]] = {}
     for key, run in runs.items():
         label, _, setting = key.partition("|")
         try:
-            found = run()
+            end_q = run()
         except Exception as failure:  # a peer that gives up is a result too
             curves.setdefault(label, {})[setting] = {"failure": str(failure).splitlines()[0]}
             continue
-        curves.setdefault(label, {})[setting] = {"error_rad": error(tree, found[: len(q)], exact)}
-        timed[key] = lambda r=run: repeated(r)
-    for key, values in measure.rounds(timed, rounds).items():
+        curves.setdefault(label, {})[setting] = {
+            "error_rad": angle_error(tree, end_q[: len(q)], exact)
+        }
+        timed_runs[key] = lambda r=run: 1e3 * measure.call_time(r)
+    for key, values in measure.sample_rounds(timed_runs, rounds).items():
         label, _, setting = key.partition("|")
         curves[label][setting]["cpu_ms"] = [round(v, 5) for v in values]
-    return {"scene": name, "reference_change": error(tree, check, exact), "curves": curves}
+    return {"scene": name, "reference_change": angle_error(tree, coarse, exact), "curves": curves}
 
 
-def repeated(run: Callable[[], object]) -> float:
-    """CPU ms of one run; short ones are repeated until they last 5 ms."""
-    first = measure.cpu(run)
-    if first > 5e-3:
-        return first * 1e3
-    count = max(2, int(5e-3 / max(first, 1e-5)))
-    return measure.cpu(lambda: [run() for _ in range(count)]) / count * 1e3
-
-
-def cheapest(curve: dict[str, Any], asked: float = ASKED) -> tuple[str, float] | None:
+def cheapest(curve: dict[str, Any], target_error: float = TARGET_ERROR) -> tuple[str, float] | None:
     """Setting and CPU ms of the cheapest run whose error is small enough."""
-    good = [
+    accurate = [
         (min(point["cpu_ms"]), setting)
         for setting, point in curve.items()
-        if point.get("error_rad", 1.0) <= asked and point.get("cpu_ms")
+        if point.get("error_rad", 1.0) <= target_error and point.get("cpu_ms")
     ]
-    return (min(good)[1], min(good)[0]) if good else None
+    return (min(accurate)[1], min(accurate)[0]) if accurate else None
 
 
 def table(results: list[dict[str, Any]]) -> str:
     """Markdown: cheapest run with an error of at most 1e-9 rad."""
     lines = ["| scene | tool | setting | error, rad | CPU ms | mstmm / it |", "|---" * 6 + "|"]
     for result in results:
-        own = cheapest(result["curves"]["mstmm"])
+        own_best = cheapest(result["curves"]["mstmm"])
         for name, curve in result["curves"].items():
-            found = cheapest(curve)
-            if found is None:
-                best = min((p["error_rad"] for p in curve.values() if "error_rad" in p), default=1)
-                lines.append(f"| {result['scene']} | {name} | none: {best:.1e} at best | | | |")
+            best = cheapest(curve)
+            if best is None:
+                smallest_error = min(
+                    (p["error_rad"] for p in curve.values() if "error_rad" in p), default=1
+                )
+                lines.append(
+                    f"| {result['scene']} | {name} | none: {smallest_error:.1e} at best | | | |"
+                )
                 continue
-            setting, value = found
-            ratio = f"{own[1] / value:.3f}" if own else ""
-            reached = f"{curve[setting]['error_rad']:.1e}"
+            setting, value = best
+            ratio = f"{own_best[1] / value:.3f}" if own_best else ""
+            achieved = f"{curve[setting]['error_rad']:.1e}"
             lines.append(
-                f"| {result['scene']} | {name} | {setting} | {reached} | {value:.3f} | {ratio} |"
+                f"| {result['scene']} | {name} | {setting} | {achieved} | {value:.3f} | {ratio} |"
             )
     return "\n".join(lines)
 
 
 def main() -> None:
     """Measure, print the table, draw."""
-    parser = measure.options(str(__doc__).splitlines()[0], HERE)
+    parser = measure.option_parser(str(__doc__).splitlines()[0], HERE)
     parser.add_argument("--rounds", type=int, default=4)
     options = parser.parse_args()
     if not options.plot:
         count = 1 if options.quick else options.rounds
-        results = [measured(name, count, options.quick) for name in SCENES]
-        measure.save(options.json, results, unit="CPU ms of 10 s", asked_error_rad=ASKED)
-    record = json.loads(options.json.read_text())
-    text = table(record["results"])
-    print(text)
-    options.json.with_suffix(".md").write_text(text + "\n")
+        results = [measure_scene(name, count, options.quick) for name in SCENES]
+        measure.save_record(
+            options.json, results, unit="CPU ms of 10 s", target_error_rad=TARGET_ERROR
+        )
+    record = measure.write_table(options.json, table)
     from picture import draw
 
     draw(record, cheapest, options.picture)

@@ -104,12 +104,12 @@ def test_an_engine_compiled_on_the_way_changes_nothing(
 
 def test_stiff_rods_take_a_tenth_of_the_work() -> None:
     case = CASES["a10-1e8"]
-    model, (expected, _) = compiled(case.scene()), references.load(case)
+    model, (expected, _) = compiled(case.scene()), references.load_reference(case)
     auto, plain = (
         model.simulate(case.t_end, method=method, **LOOSE) for method in ("auto", "dop853")
     )
     assert names(auto) == ["dop853", "rodas4p2"]
-    error = np.linalg.norm(references.places(auto, case) - expected, axis=1).max()
+    error = np.linalg.norm(references.end_positions(auto, case) - expected, axis=1).max()
     assert error < 1e-4
     assert work(auto) < work(plain) / 10
     change = auto.method_history[1]

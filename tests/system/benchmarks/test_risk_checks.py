@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from benchmarks.risk_checks import motions
-from benchmarks.risk_checks.report import Judged, counts, table
+from benchmarks.risk_checks.report import CheckCase, counts, table
 from benchmarks.risk_checks.trials import Trial
 
-AFTER = Judged("slope", False, "bent", "force", "much")
-BEFORE = Judged("slope", True, "bent", "force", "much")
+AFTER = CheckCase("slope", False, "bent", "force", "much")
+BEFORE = CheckCase("slope", True, "bent", "force", "much")
 
 TRIALS = [
     Trial(1.0, (), (), 0.5),
@@ -44,7 +44,7 @@ def test_the_page_has_a_row_for_each() -> None:
 def test_both_sides_are_drawn_and_draw_the_same_again(family: object) -> None:
     assert callable(family)
     trials = [family(np.random.default_rng([1, i])) for i in range(12)]
-    assert {trial.wrong for trial in trials} == {True, False}
+    assert {trial.is_wrong for trial in trials} == {True, False}
     assert trials[0] == family(np.random.default_rng([1, 0]))
 
 
@@ -52,4 +52,4 @@ def test_both_sides_are_drawn_and_draw_the_same_again(family: object) -> None:
 def test_what_is_seen_of_a_fixed_step_counts_as_seen_before() -> None:
     """Nothing looks at it before the run unless it is asked to refuse."""
     trials = [motions.explicit_step(np.random.default_rng([1, i])) for i in range(12)]
-    assert any("step-stability" in trial.before for trial in trials if trial.wrong)
+    assert any("step-stability" in trial.reported_before for trial in trials if trial.is_wrong)

@@ -12,7 +12,7 @@ import sympy as sp
 
 import mstmm
 from benchmarks.stiff import references, scenes
-from benchmarks.stiff.absolute import BushedRods
+from benchmarks.stiff.absolute_coordinates import BushedRods
 from benchmarks.stiff.cases import CASES
 from tests.support.implicit_methods.lagrange import accelerations, energy, rate, turned
 from tests.support.implicit_methods.quarter_car import quarter_car_at
@@ -86,8 +86,8 @@ def test_half_car_follows_lagrange(rng: np.random.Generator) -> None:
 
 def test_quarter_car_is_where_its_linear_equations_say() -> None:
     case = CASES["d-quarter"]
-    found, _ = references.load(case)
-    assert case.watched == ("wheel", "plate", "car")
+    found, _ = references.load_reference(case)
+    assert case.end_names == ("wheel", "plate", "car")
     assert found[:, 1] == pytest.approx(quarter_car_at(case.t_end), abs=1e-11)
     assert not found[:, [0, 2]].any()
 
@@ -96,13 +96,13 @@ def test_stored_rods_are_where_absolute_coordinates_say() -> None:
     case = CASES["a10-1e6"]
     assert case.bushings is not None
     tips, _ = BushedRods(*case.bushings).run(case.t_end, 1e-7, 1e4)
-    found, _ = references.load(case)
+    found, _ = references.load_reference(case)
     assert np.abs(tips() - found).max() < 1e-6
 
 
 def test_rods_in_absolute_coordinates_have_an_exact_jacobian(rng: np.random.Generator) -> None:
     rods = BushedRods(5, 1e6, 0.1)
-    y = rods.start + rng.uniform(-0.1, 0.1, len(rods.start))
+    y = rods.initial_state + rng.uniform(-0.1, 0.1, len(rods.initial_state))
     columns = [np.imag(rods.rates(0.0, y + 1e-30j * unit)) / 1e-30 for unit in np.eye(len(y))]
     assert rods.jacobian(0.0, y).toarray() == pytest.approx(np.array(columns).T, rel=1e-13)
 
@@ -111,9 +111,9 @@ def test_every_case_has_a_reference_on_which_two_methods_agree() -> None:
     kept = json.loads(references.FILE.read_text())
     assert list(kept) == list(CASES)
     for name, case in CASES.items():
-        found, apart = references.load(case)
+        found, apart = references.load_reference(case)
         assert apart < 1e-9, name
-        assert np.isfinite(found).all() and found.shape == (len(case.watched), 3)
+        assert np.isfinite(found).all() and found.shape == (len(case.end_names), 3)
 
 
 @pytest.mark.parametrize("name", ["a10-1e4", "b4-spun", "d-half", "e"])
@@ -123,4 +123,7 @@ def test_references_can_be_computed_again(name: str) -> None:
     result = model.simulate(
         case.t_end, method="dop853", rtol=1e-9, atol=1e-11, output_times=[case.t_end]
     )
-    assert np.abs(references.places(result, case) - references.load(case)[0]).max() < 1e-8
+    assert (
+        np.abs(references.end_positions(result, case) - references.load_reference(case)[0]).max()
+        < 1e-8
+    )

@@ -1,7 +1,7 @@
-"""What it takes to compile for scenes of more and more bodies: Markdown, on the standard output.
+"""CPU time of compilation over the number of bodies, as Markdown on the standard output.
 
-CPU seconds (user and system) of one fresh process each, its cache empty: our own text and the
-compiler's.  `python benchmarks/startup/growth.py [KIND ...]`.
+CPU seconds (user and system) of a fresh process with an empty cache: mstmm + gcc.
+`python benchmarks/startup/compile_time.py [KIND ...]`.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from common import scenes
 from common.flexible_scenes import Strip
 
 COUNTS = (25, 50, 100, 200)
-#: Beyond what a busy machine needs, in s of wall time.
-PATIENCE = "3600"
+#: Wall time, s; sufficient for a busy machine.
+TIMEOUT = "3600"
 
 
 def tree(n: int) -> dict[str, Any]:
     """Pins; every body carries two others."""
-    made = scenes.pins(n)
-    for i, hinge in enumerate(made["hinge"][1:]):
+    scene = scenes.pins(n)
+    for i, hinge in enumerate(scene["hinge"][1:]):
         hinge["inboard"] = f"rod{i // 2}.tip"
-    return made
+    return scene
 
 
 KINDS: dict[str, Callable[[int], dict[str, Any]]] = {
@@ -39,41 +39,43 @@ KINDS: dict[str, Callable[[int], dict[str, Any]]] = {
 }  # fmt: skip
 
 
-def spent(who: int) -> float:
+def cpu_seconds(usage_kind: int) -> float:
     """CPU seconds so far."""
-    usage = getrusage(who)
+    usage = getrusage(usage_kind)
     return usage.ru_utime + usage.ru_stime
 
 
-def measure(kind: str, count: int) -> None:
-    """Print our seconds and the compiler's; in a process of its own."""
+def print_cost(kind: str, count: int) -> None:
+    """Print the CPU seconds of mstmm and of gcc, in a separate process."""
     import mstmm
 
     scene = mstmm.Scene(**KINDS[kind](count))
     mstmm.compile(scene, engine="looped")
-    before = spent(RUSAGE_SELF)
+    before = cpu_seconds(RUSAGE_SELF)
     mstmm.compile(scene, engine="fused")
-    print(f"{spent(RUSAGE_SELF) - before:.2f} {spent(RUSAGE_CHILDREN):.2f}")
+    print(f"{cpu_seconds(RUSAGE_SELF) - before:.2f} {cpu_seconds(RUSAGE_CHILDREN):.2f}")
 
 
-def measured(kind: str, count: int) -> str:
+def table_cell(kind: str, count: int) -> str:
     """A cell: both seconds."""
     with tempfile.TemporaryDirectory(prefix="growth-") as cache:
-        environment = os.environ | {"MSTMM_CACHE": cache, "MSTMM_COMPILE_TIMEOUT": PATIENCE}
+        environment = os.environ | {"MSTMM_CACHE": cache, "MSTMM_COMPILE_TIMEOUT": TIMEOUT}
         command = [sys.executable, __file__, "--one", kind, str(count)]
-        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
-    return " + ".join(done.stdout.split()[-2:])
+        process = subprocess.run(
+            command, env=environment, capture_output=True, text=True, check=True
+        )
+    return " + ".join(process.stdout.split()[-2:])
 
 
 def main() -> None:
     """All of the table, or the rows of some kinds."""
     if sys.argv[1:2] == ["--one"]:
-        measure(sys.argv[2], int(sys.argv[3]))
+        print_cost(sys.argv[2], int(sys.argv[3]))
         return
     print(f"| CPU s, ours + gcc's | {' | '.join(map(str, COUNTS))} |")
     print("|---" * (1 + len(COUNTS)) + "|")
     for kind in sys.argv[1:] or KINDS:
-        cells = (measured(kind, count) for count in COUNTS)
+        cells = (table_cell(kind, count) for count in COUNTS)
         print(f"| {kind} | {' | '.join(cells)} |", flush=True)
 
 

@@ -1,6 +1,6 @@
 """The first result of a process: the tip of a seven-body chain after 0.1 s.
 
-python first.py SCENE ENGINE
+python first_result.py SCENE ENGINE
 """
 
 import sys

@@ -1,6 +1,6 @@
-"""What CasADi needs for the same scene: graph, C, compiler, CVODES (its jit has no cache).
+"""First result of CasADi for the same scene: graph, C, compiler, CVODES without a cache.
 
-python first_casadi.py SCENE
+python first_casadi_result.py SCENE
 """
 
 import json
@@ -11,9 +11,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import casadi as ca
 from common.aba import articulated_body
-from common.links import links_of
+from common.links import link_tree
 
-tree = links_of(json.loads(Path(sys.argv[1]).read_text()))
+tree = link_tree(json.loads(Path(sys.argv[1]).read_text()))
 function, _ = articulated_body(tree, baked=True)
 x = ca.SX.sym("x", tree.nq + tree.nu)
 rates = function(ca.SX(0, 1), x[: tree.nq], x[tree.nq :], ca.SX.zeros(tree.nu))

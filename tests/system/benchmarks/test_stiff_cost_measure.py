@@ -10,7 +10,7 @@ import pytest
 import mstmm
 from benchmarks.stiff import programs, references
 from benchmarks.stiff.cases import CASES
-from benchmarks.stiff.counting import cheapest, evaluations, frontier, holding
+from benchmarks.stiff.cost_measure import accurate_points, cheapest, evaluations, frontier
 
 
 def point(tolerance: float, error: float, *cpu_ms: float) -> dict[str, Any]:
@@ -22,7 +22,7 @@ def test_a_lucky_point_does_not_count() -> None:
     points = [lucky, point(1e-3, 1e-3, 2.0), point(1e-4, 1e-5, 4.0), point(1e-5, 1e-6, 8.0)]
     assert cheapest(points, 1e-4) is points[2]
     assert cheapest(points, 1e-2) is lucky
-    assert [p["tolerance"] for p in holding(points, 1e-4)] == [1e-5, 1e-4]
+    assert [p["tolerance"] for p in accurate_points(points, 1e-4)] == [1e-5, 1e-4]
     assert cheapest(points, 1e-7) is None
 
 
@@ -47,34 +47,34 @@ def test_work_is_counted_in_evaluations() -> None:
 def test_a_method_that_does_not_exist_is_left_out_with_a_word() -> None:
     case, heard = CASES["d-quarter"], list[str]()
     model = mstmm.compile(mstmm.Scene(**case.scene()), engine="looped")
-    assert programs.own(model, case, "nobody9", heard.append) is None
+    assert programs.method_curve(model, case, "nobody9", heard.append) is None
     assert heard == ['left out: method "nobody9" is not known']
-    assert programs.takes_steps(model, "rk4") is True
-    assert programs.takes_steps(model, "dop853") is False
+    assert programs.has_fixed_steps(model, "rk4") is True
+    assert programs.has_fixed_steps(model, "dop853") is False
 
 
 @pytest.mark.parametrize("method", ["dop853", "rk4"])
 def test_methods_come_nearer_to_the_reference_as_settings_tighten(method: str) -> None:
     case = CASES["e"]
-    exact, _ = references.load(case)
+    exact, _ = references.load_reference(case)
     model = mstmm.compile(mstmm.Scene(**case.scene()), engine="looped")
-    curve = programs.own(model, case, method, print)
+    curve = programs.method_curve(model, case, method, print)
     assert curve is not None
     settings = [setting for setting, _ in curve.settings]
     assert settings == sorted(settings, reverse=True)
     errors = []
     for _, run in curve.settings[3:10:3]:
-        look, counts = run()
+        read_positions, counts = run()
         assert counts["evaluations"] > 0
-        errors.append(float(np.abs(look() - exact).max()))
+        errors.append(float(np.abs(read_positions() - exact).max()))
     assert errors[0] > 10 * errors[1] > 100 * errors[2]
 
 
 def test_scipy_meets_the_same_motion() -> None:
     case = CASES["d-quarter"]
-    exact, _ = references.load(case)
+    exact, _ = references.load_reference(case)
     model = mstmm.compile(mstmm.Scene(**case.scene()), engine="looped")
-    curve = programs.radau(model, case)[-1]
-    look, counts = dict(curve.settings)[1e-6]()
+    curve = programs.radau_curves(model, case)[-1]
+    read_positions, counts = dict(curve.settings)[1e-6]()
     assert counts["jacobians"] > 0
-    assert np.abs(look() - exact).max() < 1e-5
+    assert np.abs(read_positions() - exact).max() < 1e-5
