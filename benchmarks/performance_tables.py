@@ -156,7 +156,7 @@ def long_chains(record: dict[str, Any], run: ModuleType) -> str:
     sizes = {"pins": (10_000, 100_000), "balls": (10_000, 33_334)}
     rows = [
         [f"{r['bodies']:_} {r['kind']}".replace("_", " "), r["tool"],
-         duration(1e9 * r["run_s_per_s"]) if "run_s_per_s" in r else "fails",
+         duration(1e9 * r["run_s_per_s"]) if "run_s_per_s" in r else r["failure"],
          f"{r['memory_mib']:.0f} MiB" if "memory_mib" in r else ""]
         for kind, counts in sizes.items() for bodies in counts for r in record["results"]
         if (r["kind"], r["bodies"]) == (kind, bodies) and r["tool"] in ("mstmm", "Exudyn, sparse")

@@ -34,7 +34,8 @@ FAMILIES: dict[str, Callable[[np.random.Generator], Trial]] = {
     for family in (
         motions.explicit_step, motions.implicit_step, motions.pulse_in_angle,
         motions.pulse_in_time, motions.heavy_tip, motions.gimbal_top, motions.loose_balls,
-        bodies.spinning_linear_beam, bodies.light_hub, bodies.strongly_bent_beam, bodies.shaken_beam,
+        bodies.spinning_linear_beam, bodies.light_hub, bodies.strongly_bent_beam,
+        bodies.shaken_beam,
     )
 }  # fmt: skip
 

@@ -71,7 +71,8 @@ def survey_case(
         distance.scaling,
     )
     report(
-        f"{case.name}: reference good to {reference_run.error:.1e} m after {budget.elapsed:.0f} s"
+        f"{case.name}: reference good to {reference_run.error:.1e} m "
+        f"after {budget.elapsed_time:.0f} s"
     )
     curves = [
         method_curve(name, engine, entry, case.t_end, reference.smallest_resolved_error, None)
