@@ -15,7 +15,7 @@ from importlib.resources import files
 from typing import Any
 
 from .interpreter import GuardFailure, evaluate_floats
-from .kernel import KernelIR, from_json, to_json
+from .kernel import KernelIR, kernel_from_data, to_json
 from .param import Param
 from .statements import Assign, Constant, Element, Operand, Store, Temporary
 
@@ -365,8 +365,8 @@ def hinge_properties_from_data(data: dict[str, Any]) -> HingeProperties:
     return HingeProperties(
         **fields, **groups, keys=tuple(data["keys"]), straight=data["straight"],
         in_place=data["in_place"],
-        varies=tuple(data["varies"]), start_motion=from_json(json.dumps(data["start_motion"])),
-        rates=from_json(json.dumps(data["rates"])) if "rates" in data else None,
+        varies=tuple(data["varies"]), start_motion=kernel_from_data(data["start_motion"]),
+        rates=kernel_from_data(data["rates"]) if "rates" in data else None,
     )  # fmt: skip
 
 

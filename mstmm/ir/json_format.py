@@ -8,7 +8,7 @@ from typing import Any
 
 from .element_spec import ElementSpec, Param
 from .hinge_properties import hinge_properties, hinge_properties_from_data, hinge_properties_to_data
-from .kernel import KernelIR, from_json, to_json
+from .kernel import KernelIR, kernel_from_data, to_json
 
 
 def element_to_json(spec: ElementSpec) -> str:
@@ -39,7 +39,7 @@ def element_from_json(text: str) -> ElementSpec:
         group: tuple(Param(*entry) for entry in data[group])
         for group in ("coordinates", "speeds", "parameters")
     }
-    kernels = tuple(from_json(json.dumps(kernel)) for kernel in data["kernels"])
+    kernels = tuple(map(kernel_from_data, data["kernels"]))
     facts = None
     if "facts" in data:
         facts = hinge_properties_from_data(data["facts"])
@@ -58,4 +58,4 @@ def kernel_from_json(text: str, name: str) -> KernelIR:
     KeyError if the element has no kernel of this name; ValueError as for `element_from_json`.
     """
     stored = {kernel["name"]: kernel for kernel in json.loads(text)["kernels"]}
-    return from_json(json.dumps(stored[name]))
+    return kernel_from_data(stored[name])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -200,7 +200,11 @@ def to_json(kernel: KernelIR) -> str:
 
 def from_json(text: str) -> KernelIR:
     """Restore a kernel from the result of `to_json`.  ValueError if it is invalid."""
-    data = json.loads(text)
+    return kernel_from_data(json.loads(text))
+
+
+def kernel_from_data(data: Mapping[str, Any]) -> KernelIR:
+    """Restore a kernel from its parsed JSON.  ValueError if it is invalid."""
 
     def port(p: list[Any]) -> Port:
         return Port(p[0], tuple(p[1]), p[2], p[3], accumulate="accumulate" in p[4:])

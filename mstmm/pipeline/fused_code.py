@@ -22,8 +22,9 @@ import numpy as np
 from ..abi import derivative_library as columns_abi
 from ..abi.fused_library import ABI_VERSION, COMPILER_FLAGS, OPTIONAL_FLAGS
 from ..errors import ElementError, EnvironmentFailure, SceneError
-from ..ir import KernelIR, from_json
+from ..ir import KernelIR
 from ..ir.element_spec import ElementSpec
+from ..ir.kernel import kernel_from_data
 from ..ir.scene_structure import BodyStructure, Key, Structure
 from ..runtime.kernels.derivative_library import DerivativeLibrary, open_derivative_library
 from ..runtime.kernels.fused_library import FusedLibrary, open_library
@@ -497,4 +498,4 @@ def _prebuilt_kernel(key: Key, name: str) -> KernelIR:
     data = _stored_kernels(key).get(name)
     if data is None:
         raise ElementError(f"{key[0]} {key[1]} has no kernel {name!r}")
-    return from_json(json.dumps(data))
+    return kernel_from_data(data)

@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 
 import mstmm.generated
-from mstmm.ir import KernelIR, from_json
+from mstmm.ir import KernelIR
+from mstmm.ir.kernel import kernel_from_data
 from tests.reference import laws
 from tests.reference import newton_euler as dense
 from tests.reference.jets import Array
@@ -35,7 +36,7 @@ def generated_kernel(name: str) -> KernelIR:
     """The stored kernel of a classical matrix."""
     folder = Path(mstmm.generated.__path__[0])
     data = json.loads((folder / f"classical_{name}.json").read_text())
-    return from_json(json.dumps(data["kernels"][0]))
+    return kernel_from_data(data["kernels"][0])
 
 
 @dataclass(frozen=True)
