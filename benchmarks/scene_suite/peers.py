@@ -30,7 +30,12 @@ FOURTH_ORDER_RATES, SIXTH_ORDER_RATES = (
     tuple(10 ** (k / 4) for k in range(*ends)) for ends in ((6, 18), (4, 15))
 )  # fmt: skip
 #: Names of programs.
-NAMES = {"casadi": "CasADi", "pinocchio": "Pinocchio", "mujoco": "MuJoCo", "exudyn": "Exudyn"}
+NAMES = {
+    "casadi_curves": "CasADi",
+    "pinocchio_curves": "Pinocchio",
+    "mujoco_curves": "MuJoCo",
+    "exudyn_curves": "Exudyn",
+}
 #: Most links of which straight-line C is compiled.
 _MAX_BAKED_LINKS = 30
 #: Evaluations by which the fastest of several builds is chosen.

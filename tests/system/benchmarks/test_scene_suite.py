@@ -136,7 +136,7 @@ def test_who_has_no_such_scene_is_told() -> None:
 
 
 def test_the_command_writes_its_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("benchmarks.scene_suite.__main__.compared", lambda *_: arm())
+    monkeypatch.setattr("benchmarks.scene_suite.__main__.compare", lambda *_: arm())
     main(["arm", "--quick", "--out", str(tmp_path)])
     assert {path.name for path in tmp_path.iterdir()} == {"result.json", "result.md", "result.png"}
     text = (tmp_path / "result.md").read_text()
