@@ -22,7 +22,7 @@ from tests.support.scenes.advice import (
 
 @cache
 def advised(name: str, error: float) -> mstmm.Advice:
-    return mstmm.advise(hub_and_beam(name), period(name), error=error, of=TIP, rounds=1, budget=600)
+    return mstmm.advise(hub_and_beam(name), period(name), error=error, of=TIP, rounds=0, budget=600)
 
 
 @pytest.mark.parametrize("error", [1e-3, 1e-2])
