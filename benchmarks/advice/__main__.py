@@ -8,14 +8,12 @@ rules).  Minimum CPU time of whole warm calls in alternating rounds, looped engi
 
 from __future__ import annotations
 
-import json
 from argparse import ArgumentParser
-from dataclasses import asdict
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 from ..common import measure
+from ..common.random_trials import run_and_store
 from ..error_control.scenes import draw_scenes
 from . import scenes, trials
 from .report import table
@@ -44,26 +42,12 @@ def main() -> None:
         (name, trial, options.rounds)
         for name, trial in {**scenes.hub_scenes(), **random_scenes}.items()
     ]
-    outcomes: list[trials.Outcome] = []
-    scenes_without_reference: dict[str, float] = {}
     data: dict[str, Any] = {
         "machine": measure.machine(), "set": "tuning" if options.tuning else "test",
         "each": options.each, "seed": seed, "rounds": options.rounds, "jobs": options.jobs,
         "scenes_drawn": len(random_scenes),
     }  # fmt: skip
-    with get_context("spawn").Pool(options.jobs) as pool:
-        for name, new_outcomes, floor in pool.imap_unordered(trials.run_scene, tasks):
-            if not new_outcomes:
-                scenes_without_reference[name] = floor
-            outcomes += new_outcomes
-            print(*(trial.text() for trial in new_outcomes), sep="\n", flush=True)
-            data |= {
-                "without_reference": scenes_without_reference,
-                "outcomes": [asdict(trial) for trial in outcomes],
-            }
-            text = json.dumps(data, indent=1) + "\n"
-            (options.out / "result.json").write_text(text, encoding="utf-8")
-            (options.out / "result.md").write_text(table(outcomes, data), encoding="utf-8")
+    run_and_store(trials.run_scene, tasks, options.jobs, data, table, options.out)
 
 
 if __name__ == "__main__":

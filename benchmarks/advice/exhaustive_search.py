@@ -170,14 +170,18 @@ def candidate_models(base: mstmm.Scene) -> Iterator[tuple[str, mstmm.Scene]]:
         ]
     else:
         max_count = max(len(choices) for choices in choices_of_bodies.values())
-        choices_of_models = [{name: choices[min(i, len(choices) - 1)] for name,
-        choices in choices_of_bodies.items()}
-                  for i in range(max_count)]  # fmt: skip
+        choices_of_models = [
+            {name: choices[min(i, len(choices) - 1)] for name, choices in choices_of_bodies.items()}
+            for i in range(max_count)
+        ]
         choices_of_models += [
-            {name: choices[-1] if name != body else choices[i] for name,
-            choices in choices_of_bodies.items()}
-            for body in choices_of_bodies for i in range(len(choices_of_bodies[body]))
-        ]  # fmt: skip
+            {
+                name: choices[i if name == body else -1]
+                for name, choices in choices_of_bodies.items()
+            }
+            for body, own_choices in choices_of_bodies.items()
+            for i in range(len(own_choices))
+        ]
     for choices in choices_of_models:
         yield "; ".join(f"{k}: {v}" for k, v in choices.items()), bodies.scene_of(choices)
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
+from ..common.random_trials import Criterion, count_lines, reference_note, share
 from .trials import Outcome
 
 #: Text, criterion and target share in percent of each count.
-COUNTS: tuple[tuple[str, Callable[[Outcome], bool | None], int], ...] = (
+COUNTS: tuple[tuple[str, Criterion, int], ...] = (
     ("true error at most the target", lambda trial: trial.is_met, 95),
     ("time at most 2 times the cheapest sure model", lambda trial: trial.is_within(2.0), 80),
     ("time at most 3 times the cheapest sure model", lambda trial: trial.is_within(3.0), 0),
@@ -21,18 +22,11 @@ COUNTS: tuple[tuple[str, Callable[[Outcome], bool | None], int], ...] = (
 )
 
 
-def share(outcomes: Sequence[Outcome], criterion: Callable[[Outcome], bool | None]) -> str:
-    """Share as text: 45 of 50 (90 %)."""
-    values = [value for trial in outcomes if (value := criterion(trial)) is not None]
-    part = 100 * sum(values) / len(values) if values else 0.0
-    return f"{sum(values)} of {len(values)} ({part:.0f} %)"
-
-
 def table(outcomes: Sequence[Outcome], data: dict[str, Any]) -> str:
     """Page: counts by target error and family, scenes A to D, exceptions."""
     hub_outcomes = [trial for trial in outcomes if len(trial.scene) == 1]
     random = [trial for trial in outcomes if len(trial.scene) > 1]
-    target = sorted({trial.target for trial in outcomes}, reverse=True)
+    errors = sorted({trial.target for trial in outcomes}, reverse=True)
     machine = data["machine"]
     lines = [
         "# Advised and cheapest models",
@@ -46,16 +40,8 @@ def table(outcomes: Sequence[Outcome], data: dict[str, Any]) -> str:
         "Scenes whose beams are split (no model of the ladder is enough) are compared with sixteen "
         "parts and have no cheapest model.",
         "",
-        "| | target | all | " + " | ".join(f"{trial:.0e}" for trial in target) + " |",
-        "|---|---|---|" + "---|" * len(target),
+        *count_lines(random, errors, COUNTS),
     ]
-    for text, criterion, aim in COUNTS:
-        cells = [
-            share([trial for trial in random if trial.target == trial], criterion)
-            for trial in target
-        ]
-        goal = f"{aim} %" if aim else ""
-        lines.append(f"| {text} | {goal} | {share(random, criterion)} | {' | '.join(cells)} |")
     lines += ["", "| family | target met | time within 2 | median of time / cheapest | median of "
               "time of the scene as given / advised |", "|---|---|---|---|---|"]  # fmt: skip
     for family in dict.fromkeys(trial.family for trial in random):
@@ -83,9 +69,7 @@ def table(outcomes: Sequence[Outcome], data: dict[str, Any]) -> str:
         "",
         *(f"    {trial.text()}" for trial in exceptions),
     ]
-    if data["without_reference"]:
-        lines += ["", "Without a sufficient reference: "
-                  + ", ".join(data["without_reference"])]  # fmt: skip
+    lines += reference_note(data)
     return "\n".join(lines) + "\n"
 
 
