@@ -87,7 +87,7 @@ def measure_all(quick: bool) -> tuple[dict[str, list[float]], float | None]:
 
         model = mstmm.compile(scenes["platform"], engine="looped")
         peer = MujocoPlatform(model)
-        difference = measure.relative_difference(peer.slides(), leg_accelerations(model))
+        difference = measure.relative_difference(peer.leg_accelerations(), leg_accelerations(model))
         work["platform, MuJoCo"] = lambda: (
             1e6 * measure.call_time(lambda: peer.forward(1000)) / 1000
         )
