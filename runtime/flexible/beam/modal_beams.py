@@ -13,6 +13,7 @@ from mstmm.errors import SceneError
 from mstmm.scene.tables.beam_keys import Modes
 from mstmm.scene.tables.loads import Load
 
+from ..cache_key import CacheKey
 from ..mass_definiteness import is_definite_with_first_shape, is_mass_definite
 from ..modal_body import ModalBody
 from ..numerical_checks import checked_result
@@ -40,7 +41,9 @@ if TYPE_CHECKING:
     from mstmm.scene.tables.beam import Beam
 
 
-#: Largest number of bodies kept; equal beams of this and of later scenes share them.
+#: What determines the body of a beam.
+_Source = tuple["Beam", BeamData, BoundaryConditions, Support, frozenset[str]]
+#: Largest number of bodies kept, for equal beams of this and of later scenes.
 _MAX_CACHED_BODIES = 64
 
 
@@ -59,7 +62,11 @@ class BeamBodies:
         conditions = boundary_conditions(self._environment, beam, data)
         idle = self._idle_directions(beam)
         support = self._supports.support_of(beam.name)
-        body = _cached_body(_BeamSource(beam, data, conditions, support, idle))
+        key = (
+            repr(beam.model_copy(update={"name": ""})), repr(conditions), idle,
+            support.motion.tobytes(), support.inertia.tobytes(),
+        )  # fmt: skip
+        body = _cached_body(CacheKey(key, (beam, data, conditions, support, idle)))
         assert body.shapes is not None
         spans = {
             load.name: body.shapes.mean_section(*_span(load, data.length))
@@ -98,33 +105,10 @@ def _span(load: Load, length: float) -> tuple[float, float]:
     return start, min(end, length)
 
 
-class _BeamSource:
-    """Cache key: everything that determines the body of a beam, except its name."""
-
-    def __init__(
-        self,
-        beam: Beam,
-        data: BeamData,
-        conditions: BoundaryConditions,
-        support: Support,
-        idle: frozenset[str],
-    ) -> None:
-        self.beam, self.arguments = beam, (beam, data, conditions, support, idle)
-        self._key = (
-            repr(beam.model_copy(update={"name": ""})), repr(conditions), sorted(idle),
-            support.motion.tobytes(), support.inertia.tobytes(),
-        )  # fmt: skip
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _BeamSource) and self._key == other._key
-
-    def __hash__(self) -> int:
-        return hash(self._key[0])
-
-
 @lru_cache(maxsize=_MAX_CACHED_BODIES)
-def _cached_body(source: _BeamSource) -> ModalBody:
-    return checked_result(f'beam "{source.beam.name}"', lambda: _beam_body(*source.arguments))
+def _cached_body(source: CacheKey[_Source]) -> ModalBody:
+    beam = source.value[0]
+    return checked_result(f'beam "{beam.name}"', lambda: _beam_body(*source.value))
 
 
 def _beam_body(

@@ -22,6 +22,7 @@ from mstmm.scene.tables.hinge_frames import initial_motion_axes
 from mstmm.scene.validators.scalars_and_vectors import GROUND, split_reference
 
 from ...platform_support.subprocess_call import run_in_subprocess
+from ..cache_key import CacheKey
 from ..mass_definiteness import is_definite_with_first_shape, is_mass_definite
 from ..modal_body import ModalBody
 from ..modal_port import ModalPort
@@ -77,7 +78,7 @@ def modal_body(elastic: Elastic, scene: Scene) -> ModalBody:
     hinge = _inboard_hinge(elastic.name, scene)
     held = hinge.outboard_end if hinge is not None else next(iter(elastic.ends))
     loaded = frozenset(_loaded_ends(elastic.name, scene) | {held})
-    source, (frame, reason) = _ElasticSource(elastic), _frame_and_reason(elastic, hinge, held)
+    source, (frame, reason) = _cache_key(elastic), _frame_and_reason(elastic, hinge, held)
     motions = _free_motions(elastic.name, held, hinge, scene)
     body = _cached_body(source, held, loaded, motions, frame, reason)
     if elastic.frame != "auto" or frame == "mean" or _stays_definite(body, held, scene):
@@ -101,33 +102,24 @@ def _port_rotations(body: ModalBody) -> Array:
     return np.stack([port.theta for port in body.ports.values()])
 
 
-class _ElasticSource:
-    """Cache key of an [[elastic]] table and its file: equal if both are equal."""
-
-    def __init__(self, elastic: Elastic) -> None:
-        self.elastic = elastic
-        path = Path(elastic.matrices or elastic.mesh or "")
-        stamp = path.stat() if path.is_file() else None
-        file = None if stamp is None else (stamp.st_mtime_ns, stamp.st_size)
-        self._key = (elastic.model_dump_json(), str(path.absolute()), file)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _ElasticSource) and self._key == other._key
-
-    def __hash__(self) -> int:
-        return hash(self._key)
+def _cache_key(elastic: Elastic) -> CacheKey[Elastic]:
+    """Key of an [[elastic]] table and its file: equal if both are equal."""
+    path = Path(elastic.matrices or elastic.mesh or "")
+    stamp = path.stat() if path.is_file() else None
+    file = None if stamp is None else (stamp.st_mtime_ns, stamp.st_size)
+    return CacheKey((elastic.model_dump_json(), str(path.absolute()), file), elastic)
 
 
 @lru_cache(maxsize=MAX_CACHED_BODIES)
 def _cached_body(
-    source: _ElasticSource,
+    source: CacheKey[Elastic],
     held: str,
     loaded_ends: frozenset[str],
     motions: FreeMotions,
     frame: str,
     reason: str,
 ) -> ModalBody:
-    elastic = source.elastic
+    elastic = source.value
     where = f'elastic "{elastic.name}"'
     return checked_result(
         where,
