@@ -55,16 +55,19 @@ PLACES = (
     ("sweep", "laws", "rotation", "twist"),
 )
 
-#: Summands tried per place; more of them show the same.
-TRIED = 1
+#: Summands tried per place.
+COUNTS = [1, pytest.param(2, marks=pytest.mark.soak)]
 
 
+@pytest.mark.parametrize("count", COUNTS)
 @pytest.mark.parametrize(("kind", "name", "kernel", "quantity"), PLACES)
-def test_a_turned_sign_is_noticed(kind: str, name: str, kernel: str, quantity: str) -> None:
+def test_a_turned_sign_is_noticed(
+    kind: str, name: str, kernel: str, quantity: str, count: int
+) -> None:
     good = {k.name: k for k in kernels(kind, name)}
     found = mutants(good[kernel], quantity)
     assert found
-    for mutant in found[:: max(1, len(found) // TRIED)]:
+    for mutant in found[:: max(1, len(found) // count)]:
         altered = [mutant if k.name == kernel else k for k in good.values()]
         if name == "laws":
             altered = [mutant]

@@ -5,10 +5,12 @@ from __future__ import annotations
 import copy
 import json
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import hypothesis.strategies as st
+import pytest
 from hypothesis import HealthCheck, given, settings
 
 from mstmm.errors import SceneError
@@ -78,14 +80,25 @@ def check(make: Any) -> None:
     assert Scene(**scene.model_dump()) == scene
 
 
+def check_damaged(scene: Callable[[], dict[str, Any]], count: int) -> None:
+    """Damage a scene `count` times in other ways."""
+
+    @settings(max_examples=count, deadline=None, suppress_health_check=SLOW)
+    @given(st.data())
+    def check_one(draw: st.DataObject) -> None:
+        data = damaged(scene(), draw)
+        check(lambda: Scene(**data))
+
+    check_one()
+
+
 SLOW = (HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.function_scoped_fixture)
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=SLOW)
-@given(st.data())
-def test_damaged_scenes(draw: st.DataObject) -> None:
-    data = damaged(arm(), draw)
-    check(lambda: Scene(**data))
+@pytest.mark.drawn
+@pytest.mark.parametrize("count", [150, pytest.param(400, marks=pytest.mark.soak)])
+def test_damaged_scenes(count: int) -> None:
+    check_damaged(arm, count)
 
 
 def flexible() -> dict[str, Any]:
@@ -112,11 +125,10 @@ def test_the_flexible_scene_is_one() -> None:
     assert Scene(**flexible()).warnings == ()
 
 
-@settings(max_examples=100, deadline=None, suppress_health_check=SLOW)
-@given(st.data())
-def test_damaged_flexible_scenes(draw: st.DataObject) -> None:
-    data = damaged(flexible(), draw)
-    check(lambda: Scene(**data))
+@pytest.mark.drawn
+@pytest.mark.parametrize("count", [100, pytest.param(300, marks=pytest.mark.soak)])
+def test_damaged_flexible_scenes(count: int) -> None:
+    check_damaged(flexible, count)
 
 
 @settings(max_examples=60, deadline=None, suppress_health_check=SLOW)
