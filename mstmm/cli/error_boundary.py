@@ -66,7 +66,7 @@ def run(arguments: Sequence[str]) -> int:
 
 @cache
 def _command_group() -> Callable[..., object]:
-    """All commands with their options, put together once in a process."""
+    """Group of all commands with their options, built once per process."""
     from typer.main import get_command
 
     from .app import app

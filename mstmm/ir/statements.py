@@ -37,7 +37,7 @@ class Port:
 
     def offset(self, index: tuple[int | str, ...], n: int = 0, k: int = 0, inner: int = 0) -> int:
         """Row-major index of an entry, for `LOOP_INDEX` = `k` and `INNER_INDEX` = `inner`."""
-        if len(index) == len(self.shape) == 1 and isinstance(index[0], int):  # most entries
+        if len(index) == len(self.shape) == 1 and isinstance(index[0], int):  # fast path
             return index[0]
         offset = 0
         for entry, extent in zip(index, self.shape, strict=True):

@@ -184,12 +184,12 @@ class Shapes:
         turned, stretch = np.zeros((self.n, 3, 3, _LENGTH)), np.zeros((self.n, _LENGTH))
         for k in range(self.n):
             turned[k] = _tilde_of(self._rotation_of(k))
-            stretch[k] = _padded(self._field(k, 0).deriv())
+            stretch[k] = _coefficients(self._field(k, 0).deriv())
         both = _symmetric_product(turned, _derivative(turned))
         square = _symmetric_product(turned, turned)
         grown = _integral(both)
         grown[..., 0] += square[..., 0] / 2
-        along = grown[:, :, :, 0] + _stretched(stretch, turned[:, :, 0])
+        along = grown[:, :, :, 0] + _symmetric_column_product(stretch, turned[:, :, 0])
         rest = grown - square / 2
         turn = [(rest[:, :, c, b] - rest[:, :, b, c]) / 2 for b, c in ((1, 2), (2, 0), (0, 1))]
         fields = np.concatenate([_integral(along), np.stack(turn, axis=2)], axis=2)
@@ -273,30 +273,31 @@ def tilde(vectors: Array) -> Array:
     return np.cross(vectors.T[:, None, :], np.eye(3)[None], axisb=2).swapaxes(1, 2)
 
 
-#: Coefficients of every polynomial here: more than any product of two fields has.
+#: Number of coefficients of every polynomial, enough for products of two fields.
 _LENGTH = 40
 
 
-def _padded(polynomial: Polynomial) -> Array:
-    """Coefficients with zeros up to the common length."""
+def _coefficients(polynomial: Polynomial) -> Array:
+    """Coefficients (_LENGTH,), with zeros above the degree."""
     return np.pad(polynomial.coef, (0, _LENGTH - len(polynomial.coef)))
 
 
 def _tilde_of(vector: list[Polynomial]) -> Array:
-    """Coefficients (3, 3, degree + 1) of the cross product with a vector of polynomials."""
-    x, y, z = map(_padded, vector)
+    """Coefficients (3, 3, _LENGTH) of the cross product with a vector of polynomials."""
+    x, y, z = map(_coefficients, vector)
     none = np.zeros(_LENGTH)
     return np.array([[none, -z, y], [z, none, -x], [-y, x, none]])
 
 
 def _derivative(polynomials: Array) -> Array:
+    """Derivatives of polynomials, along the last axis."""
     return np.pad(
         polynomials[..., 1:] * np.arange(1, _LENGTH), [(0, 0)] * (polynomials.ndim - 1) + [(0, 1)]
     )
 
 
 def _integral(polynomials: Array) -> Array:
-    """Integral from 0; the last coefficient is zero and is left out."""
+    """Integrals from 0 of polynomials below the highest degree, along the last axis."""
     found = np.zeros_like(polynomials)
     found[..., 1:] = polynomials[..., :-1] / np.arange(1, _LENGTH)
     return found
@@ -318,7 +319,7 @@ def _symmetric_product(left: Array, right: Array) -> Array:
     return pairs + pairs.swapaxes(0, 1)
 
 
-def _stretched(stretch: Array, column: Array) -> Array:
+def _symmetric_column_product(stretch: Array, column: Array) -> Array:
     """s_k c_m + s_m c_k of scalars (n,) and columns (n, 3) of polynomials."""
     pairs = _product("k,maj->kmaj", stretch, column)
     return pairs + pairs.swapaxes(0, 1)

@@ -1,4 +1,4 @@
-"""The standing charts in a short setting: mstmm alone, and with peers that come with SciPy."""
+"""The comparison of scenes with few settings: mstmm, and the methods of SciPy."""
 
 from __future__ import annotations
 
@@ -36,16 +36,16 @@ REFERENCE = Reference(1e-12, "two runs", "looped", "a place", "m", "none")
 
 
 def ignore_message(_: str) -> None:
-    """Nobody listens."""
+    """Drop a message."""
 
 
 @cache
 def arm() -> dict[str, Any]:
-    """mstmm and SciPy, a few settings."""
-    recommended: dict[str, Any] = compare(
+    """Comparison of the arm by mstmm and SciPy with few settings."""
+    result: dict[str, Any] = compare(
         CASES["arm"], Limits(300.0, 300.0, 1, 8, ("dop853", "rodas4p2")), True, ignore_message
     )
-    return recommended
+    return result
 
 
 def test_the_eight_scenes_run_and_end_where_they_are_watched() -> None:
@@ -61,20 +61,20 @@ def test_the_eight_scenes_run_and_end_where_they_are_watched() -> None:
 
 
 def test_a_scene_beside_scipy() -> None:
-    recommended = arm()
-    assert {OWN, "SciPy Radau", "SciPy DOP853"} <= set(recommended["fronts"])
-    assert recommended["reference"]["error"] < 1e-9
-    best = recommended["recommended"][f"{TARGET_ERRORS[0]:g}"]
-    own_runs = best["tools"][OWN]
-    assert own_runs["error_bound_m"] <= TARGET_ERRORS[0]
-    assert own_runs["error_m"] <= own_runs["error_bound_m"]
+    result = arm()
+    assert {OWN, "SciPy Radau", "SciPy DOP853"} <= set(result["fronts"])
+    assert result["reference"]["error"] < 1e-9
+    best = result["recommended"][f"{TARGET_ERRORS[0]:g}"]
+    own = best["tools"][OWN]
+    assert own["error_bound_m"] <= TARGET_ERRORS[0]
+    assert own["error_m"] <= own["error_bound_m"]
     met = {tool: p for tool, p in best["tools"].items() if tool != OWN and "cpu_ms" in p}
     assert best["best_peer"] == min(met, key=lambda tool: met[tool]["cpu_ms"])
-    assert best["ratio"] == pytest.approx(own_runs["cpu_ms"] / met[best["best_peer"]]["cpu_ms"])
+    assert best["ratio"] == pytest.approx(own["cpu_ms"] / met[best["best_peer"]]["cpu_ms"])
 
 
 def test_errors_of_a_peer_are_distances_from_the_reference() -> None:
-    """Whatever a curve's run gives is held against the place that mstmm's reference has."""
+    """Positions at the end of a run are compared with those of the reference of mstmm."""
     exact = np.array([1.0, 2.0, 3.0])
     own_runs = OwnRuns({}, REFERENCE, exact, [], [])
 
@@ -95,11 +95,11 @@ def test_errors_of_a_peer_are_distances_from_the_reference() -> None:
 
 def test_the_best_peer_is_the_cheapest_that_is_as_accurate() -> None:
     def front(tool: str, *points: tuple[float, float]) -> list[Point]:
-        recommended = [
+        points_of_tool = [
             Point(Setting(tool, "m", 10.0**-i), error, spent, 1)
             for i, (error, spent) in enumerate(points)
         ]
-        return list(bound_errors(recommended, REFERENCE))
+        return list(bound_errors(points_of_tool, REFERENCE))
 
     fronts = {
         OWN: front("dop853", (1e-5, 2e-3)), "quick": front("quick", (1e-3, 1e-4)),
@@ -120,10 +120,10 @@ def test_everybody_is_timed_once_in_every_round() -> None:
         return lambda: order.append(name)
 
     calls = {p.setting: call(p.method) for p in points}
-    recommended = time_fronts({"A": points[:1], "B": points[1:]}, calls, 3)
+    timed = time_fronts({"A": points[:1], "B": points[1:]}, calls, 3)
     firsts = [name for i, name in enumerate(order) if not i or order[i - 1] != name]
     assert firsts == ["a", "b"] * 4  # and one round to warm up
-    assert all(p.repeats == 3 and (p.cpu_s or 9) < 5 for some in recommended.values() for p in some)
+    assert all(p.repeats == 3 and (p.cpu_s or 9) < 5 for some in timed.values() for p in some)
 
 
 def test_who_has_no_such_scene_is_told() -> None:

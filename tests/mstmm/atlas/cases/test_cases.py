@@ -134,6 +134,7 @@ POINTS, TOLERANCE = 7, 0.03
 
 
 def bracket_width(name: str) -> float:
+    """Relative width to which the frontier of a case is bisected."""
     low, high = EXPECTED[name][0]
     sixth = min(0.5, math.log(high / low) / 6)
     return TOLERANCE if name in POWERS else max(TOLERANCE, sixth)
