@@ -20,7 +20,7 @@ from mstmm.runtime.packing.fused_structure import structure_of
 from mstmm.runtime.result.result import Result
 from mstmm.runtime.run.scene_system import SceneSystem
 from tests.reference.jets import Array
-from tests.runtime.engine.test_tangent_matrix import compiled, rigid, worst
+from tests.runtime.engine.test_tangent_matrix import model_and_tangent, rigid, worst
 from tests.support.draws import draws
 from tests.support.scenes import random_flexible as engine_scenes
 
@@ -52,7 +52,7 @@ class Fused:
 
 def check(scene: Scene, q: Array, u: Array, rng: Generator) -> None:
     """Residual, its rate, coordinates and solutions; entries of imposed speeds are zero."""
-    model, looped = compiled(scene)
+    model, looped = model_and_tangent(scene)
     nq, nu = looped.nq, looped.nu
     a, d_q, d_a, right, rho = (rng.normal(size=n) for n in (nu, nq, nu, nu, nq))
     expected = looped.residual(TIME, q, u, a)

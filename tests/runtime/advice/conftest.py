@@ -19,7 +19,7 @@ EVALUATION = 1e-6
 def _counted_time(monkeypatch: pytest.MonkeyPatch) -> None:
     called = Runs.simulate_with
 
-    def counted(
+    def simulate_and_count(
         self: Runs, model: Model, options: Mapping[str, Any], limit: float, own_steps: bool = False
     ) -> tuple[Result, float]:
         result, _ = called(self, model, options, limit, own_steps)
@@ -28,4 +28,4 @@ def _counted_time(monkeypatch: pytest.MonkeyPatch) -> None:
         each = s.evaluations + s.residuals + 3 * s.tangents + s.solves
         return result, EVALUATION * max(model.nu, 1) * max(each, 1)
 
-    monkeypatch.setattr(Runs, "simulate_with", counted)
+    monkeypatch.setattr(Runs, "simulate_with", simulate_and_count)

@@ -21,14 +21,14 @@ from tests.support.scenes.advice import (
 
 
 @cache
-def advised(name: str, error: float) -> mstmm.Advice:
+def beam_advice(name: str, error: float) -> mstmm.Advice:
     return mstmm.advise(hub_and_beam(name), period(name), error=error, of=TIP, rounds=0, budget=600)
 
 
 @pytest.mark.parametrize("error", [1e-3, 1e-2])
 @pytest.mark.parametrize("name", HUBS)
 def test_keeps_what_was_asked(name: str, error: float) -> None:
-    made = advised(name, error)
+    made = beam_advice(name, error)
     scene = hub_and_pieces(name, 10) if made.beam_parts else hub_and_beam(name)
     truth = tip(scene, period(name), method="rodas5p", rtol=1e-6, atol=1e-8)
     found = tip(made.scene, period(name), made.reduced_name(TIP), **made.options)
@@ -39,8 +39,8 @@ def test_keeps_what_was_asked(name: str, error: float) -> None:
 def test_levels() -> None:
     """Rigid for a stiff beam on a heavy hub, one shape for softer ones, and stiffening where the
     loads change the stiffness."""
-    (a,), (b,), (c,) = (advised(name, 1e-3).bodies for name in "ABC")
-    (d,) = advised("D", 1e-2).bodies
+    (a,), (b,), (c,) = (beam_advice(name, 1e-3).bodies for name in "ABC")
+    (d,) = beam_advice("D", 1e-2).bodies
     assert a.model.level == "rigid"
     for body in (b, c):
         assert body.model.is_coupled
@@ -51,7 +51,7 @@ def test_levels() -> None:
 
 def test_a_light_hub_at_a_looser_error_is_rigid() -> None:
     """A light hub makes a one-way response worse than none (chi 0.6): rigid errs by 4.7e-3."""
-    (body,) = advised("C", 1e-2).bodies
+    (body,) = beam_advice("C", 1e-2).bodies
     assert body.model.level == "rigid"
     assert body.error == pytest.approx(4.7e-3, rel=0.05)
 
@@ -63,7 +63,7 @@ def test_estimates() -> None:
         "D": (2.2e-1, 1.4e-1, 8.1e-2),
     }  # fmt: skip
     for name, (d, recoil, shortening) in expected.items():
-        known = advised(name, 1e-2).bodies[0].evidence
+        known = beam_advice(name, 1e-2).bodies[0].evidence
         assert known is not None
         assert known.deflection == pytest.approx(d, rel=0.06)
         chi = known.coupling
@@ -73,7 +73,7 @@ def test_estimates() -> None:
 
 def test_splits_a_beam_that_one_frame_cannot_follow() -> None:
     """A slope of 0.3: one frame errs by 2.1e-3, as against a chain of segments."""
-    strict, loose = (advised("D", error) for error in (1e-3, 1e-2))
+    strict, loose = (beam_advice("D", error) for error in (1e-3, 1e-2))
     assert set(strict.beam_parts) == {body.name for body in strict.bodies}
     assert set(strict.beam_parts.values()) == {"arm"}
     assert len(strict.beam_parts) > 2

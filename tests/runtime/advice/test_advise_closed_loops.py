@@ -18,12 +18,14 @@ BALL = {"type": "ball", "initial": {"q": [1, 0, 0, 0]}}
 T_END = 0.3
 
 
-def advised(data: Data, error: float = 1e-3, t_end: float = T_END) -> mstmm.Advice:
+def mechanism_advice(data: Data, error: float = 1e-3, t_end: float = T_END) -> mstmm.Advice:
     return mstmm.advise(mstmm.Scene(**data), t_end, error=error, rounds=0, samples=21, budget=600)
 
 
-def apart(made: mstmm.Advice, data: Data, end: str, length: float, t_end: float = T_END) -> float:
-    """Of a place, in parts of the length of the scene: the advised run beside an exact one."""
+def relative_error(
+    made: mstmm.Advice, data: Data, end: str, length: float, t_end: float = T_END
+) -> float:
+    """Largest error of a place in the advised run beside an exact one, in parts of `length`."""
     places, times = [], np.linspace(0.0, t_end, 21)
     for scene, name, options in (
         (mstmm.Scene(**data), end, {"rtol": 1e-10, "atol": 1e-12}),
@@ -47,13 +49,13 @@ def with_plate(**ends: Any) -> Data:
 @pytest.mark.parametrize(("error", "level"), [(1e-2, "rigid"), (1e-5, "linear")])
 def test_a_rod_that_bends(error: float, level: str) -> None:
     data, t_end = slider_crank(), 0.05
-    made = advised(data, error, t_end)
+    made = mechanism_advice(data, error, t_end)
     assert made.bodies[0].model.level == level
-    assert apart(made, data, "bar.tip", 0.9, t_end) < error
+    assert relative_error(made, data, "bar.tip", 0.9, t_end) < error
 
 
 def test_a_ball_in_a_plane_is_a_pin() -> None:
-    made = advised(four_bar(speed=2.0, tip=BALL))
+    made = mechanism_advice(four_bar(speed=2.0, tip=BALL))
     assert any("pin instead of ball" in one for one in made.other_changes)
 
 
@@ -66,16 +68,16 @@ def test_a_stiff_hinge_of_a_loop_becomes_rigid() -> None:
         {"name": "mid", "type": "pin", "inboard": "coupler.tip", "outboard": "other",
          "law": {"stiffness": 1e7, "damping": 1e3}},
     )  # fmt: skip
-    made = advised(data)
+    made = mechanism_advice(data)
     assert any('"mid": rigid' in one for one in made.other_changes)
-    assert apart(made, data, "other.tip", 1.2) < 1e-3
+    assert relative_error(made, data, "other.tip", 1.2) < 1e-3
 
 
 def test_welded_bodies_of_a_loop_are_one() -> None:
     data = with_plate()
-    made = advised(data)
+    made = mechanism_advice(data)
     assert len(made.scene.body) == 3
-    assert apart(made, data, "plate", 1.2) < 1e-3
+    assert relative_error(made, data, "plate", 1.2) < 1e-3
 
 
 def test_constraints_move_with_what_they_hold() -> None:
@@ -87,7 +89,7 @@ def test_constraints_move_with_what_they_hold() -> None:
     )
     data["hinge"].append({"name": "weld", "type": "fixed", "inboard": row["to"], "outboard": "tag"})
     row["to"] = "tag.eye"
-    made = advised(data)
+    made = mechanism_advice(data)
     assert "tag" not in {body.name for body in made.scene.body}
     assert made.scene.constraint[0].to == "sleeve.tag_eye"
 
@@ -98,7 +100,7 @@ def test_two_welds_between_two_bodies_stay() -> None:
     data["hinge"].append(
         {"name": "again", "type": "fixed", "inboard": "coupler", "outboard": "plate.far"}
     )
-    assert len(advised(data).scene.body) == 4
+    assert len(mechanism_advice(data).scene.body) == 4
 
 
 def test_what_a_loop_ends_on_stays_on_the_ground() -> None:
@@ -111,5 +113,5 @@ def test_what_a_loop_ends_on_stays_on_the_ground() -> None:
     end |= {"inboard": "rocker", "outboard": "post.top", "initial": {"q": -end["initial"]["q"]}}
     data["hinge"].append({"name": "bolt", "type": "fixed", "inboard": "ground", "outboard": "post",
                           "position": end.pop("position")})  # fmt: skip
-    made = advised(data)
+    made = mechanism_advice(data)
     assert "post" in {body.name for body in made.scene.body}

@@ -22,7 +22,7 @@ def short(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(advise, "choose_window", lambda *_: ComparisonWindow(WINDOW, T_END))
 
 
-def advised(**scene: Any) -> mstmm.Advice:
+def checked_advice(**scene: Any) -> mstmm.Advice:
     given = mstmm.Scene(gravity=[0, -9.81, 0], beam=[BAR], **scene)
     made = mstmm.advise(given, T_END, error=ERROR, rounds=0, budget=600)
     times = np.linspace(0.0, T_END, 201)
@@ -41,7 +41,7 @@ def advised(**scene: Any) -> mstmm.Advice:
 def test_the_integration_is_judged_over_the_whole_run() -> None:
     """A stiff bar that swings ten times as long as models are compared."""
     pin = {"name": "pin", "type": "pin", "inboard": "ground", "outboard": "bar"}
-    made = advised(hinge=[pin | {"initial": {"q": [0.5]}}])
+    made = checked_advice(hinge=[pin | {"initial": {"q": [0.5]}}])
     assert made.bodies[0].model.level == "rigid"
     assert made.error <= ERROR
     assert f"the integration over all of its {T_END:g} s" in made.comparison_text
@@ -53,7 +53,7 @@ def test_what_moves_later_stays() -> None:
         "name": "link", "mass": 2.0, "inertia": [0.02] * 3, "center_of_mass": [0.15, 0, 0],
         "ends": {"tip": [0.3, 0, 0]},
     }  # fmt: skip
-    made = advised(
+    made = checked_advice(
         body=[link],
         hinge=[
             {"name": "shoulder", "type": "ball", "inboard": "ground", "outboard": "link"},

@@ -24,7 +24,7 @@ def model() -> mstmm.Model:
 
 
 @cache
-def charted(*quantities: str) -> Chart:
+def quantity_chart(*quantities: str) -> Chart:
     return mstmm.chart(
         model(),
         T_END,
@@ -37,7 +37,7 @@ def charted(*quantities: str) -> Chart:
 
 
 def test_errors_of_all_coordinates_are_those_of_the_closed_form() -> None:
-    made = charted()
+    made = quantity_chart()
     exact = swing(TIMES) - np.pi / 2
     assert made.reference.error < 1e-11
     compared = 0
@@ -53,7 +53,7 @@ def test_errors_of_all_coordinates_are_those_of_the_closed_form() -> None:
 
 
 def test_errors_of_a_quantity_are_in_its_unit() -> None:
-    made = charted("bob.tip.position")
+    made = quantity_chart("bob.tip.position")
     assert made.reference.unit == "m"
     exact = LENGTH * np.stack([np.sin(swing(TIMES)), -np.cos(swing(TIMES))], axis=1)
     for point in made.points:
@@ -66,7 +66,7 @@ def test_errors_of_a_quantity_are_in_its_unit() -> None:
 
 def test_errors_of_orientations_are_angles() -> None:
     """Of a pendulum the same as those of its angle."""
-    turned, angle = charted("bob.orientation"), charted("pivot.angle")
+    turned, angle = quantity_chart("bob.orientation"), quantity_chart("pivot.angle")
     assert turned.reference.unit == angle.reference.unit == "rad"
     errors = {p.setting: p.error for p in angle.points}
     compared = [p for p in turned.points if p.error is not None and 1e-9 < p.error < 1.0]
@@ -76,7 +76,7 @@ def test_errors_of_orientations_are_angles() -> None:
 
 
 def test_several_quantities_count_in_parts_of_their_excursions() -> None:
-    both = charted("pivot.angle", "energy.kinetic")
+    both = quantity_chart("pivot.angle", "energy.kinetic")
     assert both.reference.unit == "1"
     highest = GRAVITY * LENGTH * (1 - np.cos(AMPLITUDE))
     for point in both.points:

@@ -18,7 +18,7 @@ METHODS = ("dop853", "rodas5p")
 
 
 @cache
-def charted() -> Chart:
+def hub_chart() -> Chart:
     return mstmm.chart(
         hub(), T_END, methods=METHODS, models=True, quantities=["blade.tip.position"],
         samples=SAMPLES, rounds=0, budget=300,
@@ -32,14 +32,14 @@ def tip(scene: mstmm.Scene, flexibility: str | None = None) -> np.ndarray:
 
 
 def test_the_ladder() -> None:
-    names = [level.name for level in charted().model_levels]
+    names = [level.name for level in hub_chart().model_levels]
     assert names == [
         "rigid", "one-way, 1 shape", "one-way, 2 shapes", "linear, 1 shape", "linear, 2 shapes",
         "stiffened, 1 shape", "stiffened, 2 shapes",
     ]  # fmt: skip
-    assert charted().reference.model == names[-1]
-    assert [level.degrees_of_freedom for level in charted().model_levels] == [1, 1, 1, 2, 3, 2, 3]
-    assert {(p.model, p.method) for p in charted().points} == {
+    assert hub_chart().reference.model == names[-1]
+    assert [level.degrees_of_freedom for level in hub_chart().model_levels] == [1, 1, 1, 2, 3, 2, 3]
+    assert {(p.model, p.method) for p in hub_chart().points} == {
         (name, method) for name in names for method in METHODS
     }
 
@@ -58,18 +58,18 @@ def test_a_level_errs_by_what_its_scene_errs(
 ) -> None:
     """Scenes that are written for a level give the error that the chart finds for it."""
     apart = np.linalg.norm(tip(scene, flexibility) - tip(hub()), axis=1).max()
-    level = next(level for level in charted().model_levels if level.name == name)
+    level = next(level for level in hub_chart().model_levels if level.name == name)
     assert level.error == pytest.approx(apart, rel=1e-2, abs=1e-7)
-    errors = [p.error for p in charted().points if p.model == name and p.error is not None]
+    errors = [p.error for p in hub_chart().points if p.model == name and p.error is not None]
     assert min(errors) == pytest.approx(apart, rel=0.15, abs=1e-7)
 
 
 def test_smaller_models_are_recommended_for_larger_errors() -> None:
     """For an error beyond that of the rigid level, and for one that shapes alone can meet."""
-    errors = {level.name: level.error for level in charted().model_levels}
+    errors = {level.name: level.error for level in hub_chart().model_levels}
     rigid, linear = errors["rigid"], errors["linear, 2 shapes"]
     assert rigid is not None and linear is not None and rigid > 10 * linear
-    cheap, fine = charted().recommend(1.3 * rigid), charted().recommend(1e-8)
+    cheap, fine = hub_chart().recommend(1.3 * rigid), hub_chart().recommend(1e-8)
     assert fine.model == "stiffened, 2 shapes"
     assert cheap.cpu_s is not None and fine.cpu_s is not None and cheap.cpu_s <= fine.cpu_s
 

@@ -25,14 +25,14 @@ STABLE = 2.785 / FASTEST
 
 
 @cache
-def damped() -> Chart:
-    """A bushing so damped that most of rk4's steps are too long."""
+def bushing_chart() -> Chart:
+    """Chart of a bushing so damped that most of rk4's steps are too long."""
     return mstmm.chart(stiff(1e4), T_END, methods=["rk4", "rodas4p2"], rounds=0, budget=300)
 
 
 def test_warnings_are_those_of_the_run() -> None:
     model = mstmm.compile(stiff(1e4), engine="looped")
-    ran = [point for point in damped().points if point.error is not None]
+    ran = [point for point in bushing_chart().points if point.error is not None]
     for point in ran:
         result = model.simulate(T_END, output_times=[0.0, T_END], **point.setting.options)
         step = result.certificate.step_stability
@@ -44,11 +44,11 @@ def test_warnings_are_those_of_the_run() -> None:
     assert [p.setting.value for p in rk4 if p.is_too_coarse]
     assert pytest.approx(5.2e-6) in [p.setting.value for p in rk4 if not p.is_too_coarse]
     assert all(p.is_too_coarse == (p.setting.value > STABLE) for p in rk4)
-    assert not [point for point in damped().pareto_front if point.is_too_coarse]
+    assert not [point for point in bushing_chart().pareto_front if point.is_too_coarse]
 
 
 def test_warnings_stand_beside_their_points() -> None:
-    chart = damped()
+    chart = bushing_chart()
     warned = next(p for p in chart.points if p.warnings and p.error)
     assert (
         f"warning: {warned.warnings[0]}"
@@ -82,7 +82,7 @@ def test_what_is_recommended_is_told_with_its_warnings() -> None:
 
 
 def test_what_the_scene_warns_of_is_told_once() -> None:
-    chart = replace(damped(), warnings=("a body is hollow",))
+    chart = replace(bushing_chart(), warnings=("a body is hollow",))
     assert chart.to_html().count("a body is hollow") == 1
     assert chart.to_dict()["warnings"] == ["a body is hollow"]
 
@@ -132,7 +132,7 @@ def test_arguments_that_say_nothing() -> None:
         mstmm.chart(pendulum(), 1.0, methods=[])
     for error in ("a", True, float("inf"), [1e-3]):
         with pytest.raises(SceneError, match=r"error = .*: expected a number above 0"):
-            damped().recommend(error)  # type: ignore[arg-type]
+            bushing_chart().recommend(error)  # type: ignore[arg-type]
 
 
 def test_no_reference_for_other_reasons_than_time() -> None:

@@ -108,12 +108,12 @@ def test_an_interrupt_within_a_short_run_is_heard(
     """A run that ends before it looks for interrupts does not hide one from the chart."""
     model = mstmm.compile(pendulum(), engine="looped")
 
-    def signalled(*arguments: Any) -> Any:
+    def interrupt_and_advance(*arguments: Any) -> Any:
         with record_interrupts():  # as runs are, whose end comes first
             os.kill(os.getpid(), signal.SIGINT)
         return advance(*arguments)
 
-    monkeypatch.setattr("mstmm.runtime.run.run_execution.advance", signalled)
+    monkeypatch.setattr("mstmm.runtime.run.run_execution.advance", interrupt_and_advance)
     runs = Runs(1e-3, np.array([0.0, 1e-3]), Budget(1e9))
     with pytest.raises(KeyboardInterrupt):
         runs.trial(model, Setting("dop853", "as given", 1e-9), Coordinates(model), limit=1e9)

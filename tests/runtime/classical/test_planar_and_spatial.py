@@ -46,7 +46,7 @@ def planar_scene(held: str, kind: str, modes: int, outboard: str = "rigid") -> m
 
 
 @pytest.fixture
-def taken(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
+def planar_flags(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
     """Whether each run was planar."""
     found: list[bool] = []
 
@@ -72,11 +72,11 @@ HINGES = ("fixed", "pin", "ball", "elastic")
 @pytest.mark.parametrize("held", [*HINGES, "free"])
 @pytest.mark.parametrize("kind", HINGES)
 def test_plane_and_space_say_the_same(
-    held: str, kind: str, taken: list[bool], monkeypatch: pytest.MonkeyPatch
+    held: str, kind: str, planar_flags: list[bool], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     model = mstmm.compile(planar_scene(held, kind, 1))
     plane = model.simulate(0.2, mstmm.methods.ClassicalDiscreteTime(RICCATI, iterations=20), 0.005)
-    assert taken == [True]
+    assert planar_flags == [True]
     in_space(monkeypatch)
     space = model.simulate(0.2, mstmm.methods.ClassicalDiscreteTime(RICCATI, iterations=20), 0.005)
     assert plane.success and space.success
@@ -110,7 +110,7 @@ def test_product_and_riccati_agree_in_the_plane(held: str, kind: str, outboard: 
     assert runs[1].q == pytest.approx(runs[0].q, abs=1e-7)
 
 
-def test_a_plane_is_taken_only_where_all_lies_in_it(taken: list[bool]) -> None:
+def test_a_plane_is_taken_only_where_all_lies_in_it(planar_flags: list[bool]) -> None:
     double = mstmm.compile(rods(2))
     double.simulate(0.02, RICCATI, 0.01)
     mstmm.compile(tree(["pin"])).simulate(0.02, RICCATI, 0.01)
@@ -119,7 +119,7 @@ def test_a_plane_is_taken_only_where_all_lies_in_it(taken: list[bool]) -> None:
     q, u = balls.initial_state()
     u[0] = 0.1
     balls.simulate(0.02, RICCATI, 0.01, initial=(q, u))
-    assert taken == [True, False, True, False]
+    assert planar_flags == [True, False, True, False]
 
 
 def test_a_pendulum_of_a_beam_errs_as_its_scheme_does() -> None:

@@ -21,7 +21,7 @@ METHODS: list[tuple[str, dict[str, Any]]] = [
 ]  # fmt: skip
 
 
-def mapped(text: str) -> TimeMap:
+def map_expression(text: str) -> TimeMap:
     return time_map([ActiveExpression(parse(text), "load")], 0.0, 1.0)
 
 
@@ -70,7 +70,7 @@ def test_a_force_whose_integral_is_finite_is_passed(method: str) -> None:
     ],
 )  # fmt: skip
 def test_poles_are_found(text: str, pole: float) -> None:
-    known = mapped(text)
+    known = map_expression(text)
     assert known.pole is not None and known.pole[0] == pytest.approx(pole, abs=1e-9)
     assert known.pole[0] in known.breaks
 
@@ -85,10 +85,10 @@ def test_poles_are_found(text: str, pole: float) -> None:
     ],
 )  # fmt: skip
 def test_what_can_be_passed_is_no_pole(text: str) -> None:
-    known = mapped(text)
+    known = map_expression(text)
     assert known.pole is None and not known.notes
 
 
 def test_a_pole_beside_the_motion_is_a_doubt() -> None:
-    (note,) = mapped("q*tan(pi*t)").notes
+    (note,) = map_expression("q*tan(pi*t)").notes
     assert note.name == "pole" and note.invalidates and "t = 0.5 s" in note.description

@@ -25,11 +25,11 @@ SHAPES = [
 ]  # fmt: skip
 
 
-def mapped(text: str, end: float, start: float = 0.0, drive: bool = False) -> TimeMap:
+def map_expression(text: str, end: float, start: float = 0.0, drive: bool = False) -> TimeMap:
     return time_map([ActiveExpression(parse(text), "load", drive=drive)], start, end)
 
 
-def at(expression: Expression, t: float) -> float:
+def value_at(expression: Expression, t: float) -> float:
     return expression.evaluate(lambda _: t)
 
 
@@ -43,7 +43,7 @@ def test_values_and_slopes_lie_within_their_bounds(text: str) -> None:
         expression.root
     ]
     inside = a + (b - a) * np.linspace(0, 1, 9)[:, None]
-    values = np.array([[at(expression, t) for t in row] for row in inside])
+    values = np.array([[value_at(expression, t) for t in row] for row in inside])
     assert np.all((values >= found.value.lo) & (values <= found.value.hi))
     slopes = np.diff(values, axis=0) / np.diff(inside, axis=0)  # a mean value of the slope
     slack = 1e-9 * (1 + np.abs(slopes))
@@ -71,7 +71,7 @@ def test_values_and_slopes_lie_within_their_bounds(text: str) -> None:
     ],
 )  # fmt: skip
 def test_every_switch_ends_a_step(text: str, end: float, times: list[float]) -> None:
-    breaks = mapped(text, end).breaks
+    breaks = map_expression(text, end).breaks
     for time in times:
         assert np.abs(breaks - time).min() < 1e-11
     for time in breaks:
@@ -80,13 +80,13 @@ def test_every_switch_ends_a_step(text: str, end: float, times: list[float]) -> 
 
 
 def test_the_open_sign_lies_between_two_breaks() -> None:
-    before, after = mapped("where(sin(t) > 0.9999, 1, 0)", 1.57).breaks
+    before, after = map_expression("where(sin(t) > 0.9999, 1, 0)", 1.57).breaks
     assert math.sin(before) < 0.9999 < math.sin(after)
     assert after - before < 1e-12
 
 
 def test_roots_that_touch_are_ends_of_steps() -> None:
-    breaks = mapped("abs(t^2 - 2*t + 1)", 3.0).breaks
+    breaks = map_expression("abs(t^2 - 2*t + 1)", 3.0).breaks
     assert breaks[0] < 1.0 < breaks[-1] and breaks[-1] - breaks[0] < 1e-6
 
 
@@ -104,7 +104,7 @@ def test_roots_that_touch_are_ends_of_steps() -> None:
 def test_narrow_parts_bound_the_step_there_and_nowhere_else(
     text: str, where: float, width: float
 ) -> None:
-    known = mapped(text, 10.0)
+    known = map_expression(text, 10.0)
     there = known.longest[np.searchsorted(known.starts, where, side="right") - 1]
     assert 0.1 * width < there < 8 * width
     assert known.longest.max() > 30 * width
@@ -112,36 +112,36 @@ def test_narrow_parts_bound_the_step_there_and_nowhere_else(
 
 
 def test_even_oscillations_take_no_more_than_their_period() -> None:
-    known = mapped("3*sin(63*t)", 1000.0)
+    known = map_expression("3*sin(63*t)", 1000.0)
     assert known.longest.tolist() == [pytest.approx(6 / 63)]
 
 
 def test_slow_expressions_bound_nothing() -> None:
     for text in ("15*t^2/2", "where(t < 1, t, 2 - t)", "2 + 3*t", "q*t"):
-        assert np.all(mapped(text, 10.0).longest > 2.0), text
+        assert np.all(map_expression(text, 10.0).longest > 2.0), text
 
 
 def test_of_a_drive_the_bends_are_narrow() -> None:
     corner = "sqrt((t - 5)^2 + 1e-8)"
-    assert mapped(corner, 10.0).longest.min(initial=np.inf) > 1.0
-    assert mapped(corner, 10.0, drive=True).longest.min() < 1e-3
+    assert map_expression(corner, 10.0).longest.min(initial=np.inf) > 1.0
+    assert map_expression(corner, 10.0, drive=True).longest.min() < 1e-3
 
 
 def test_what_cannot_be_mapped_is_named() -> None:
-    (note,) = mapped("where(sin(1e6*t) > 0, 1, 0)", 10.0).notes
+    (note,) = map_expression("where(sin(1e6*t) > 0, 1, 0)", 10.0).notes
     assert str(note).startswith("load ('where(sin(1e6*t) > 0, 1, 0)') switches too often")
-    (note,) = mapped("exp(sin(1e6*t))", 10.0).notes
+    (note,) = map_expression("exp(sin(1e6*t))", 10.0).notes
     assert "changes too often" in str(note) and "max_step" in note.remedy
 
 
 def test_a_switch_at_the_start_is_a_break_there() -> None:
-    assert mapped("sign(sin(t))", 1.0).breaks.tolist() == [0.0]
-    assert mapped("where(t > 0, 1, 0)", 1.0).breaks.tolist() == [0.0]
-    assert not len(mapped("where(t > 1, 1, 0)", 1.0).breaks)
+    assert map_expression("sign(sin(t))", 1.0).breaks.tolist() == [0.0]
+    assert map_expression("where(t > 0, 1, 0)", 1.0).breaks.tolist() == [0.0]
+    assert not len(map_expression("where(t > 1, 1, 0)", 1.0).breaks)
 
 
 def test_a_fixed_step_that_is_too_long_is_told() -> None:
-    known = mapped("100*exp(-((t - 5.03)/0.005)^2)", 10.0)
+    known = map_expression("100*exp(-((t - 5.03)/0.005)^2)", 10.0)
     told = str(known.missed_feature_risk(0.1))
     assert "the fixed step of 0.1 s is too long for load, which near t = 5.0" in told
     assert known.missed_feature_risk(0.001) is None

@@ -23,14 +23,14 @@ def on_a_rail(force: str, u: float = 0.0) -> mstmm.Scene:
     })  # fmt: skip
 
 
-def pushed(force: str, t_end: float, **options: Any) -> mstmm.Result:
-    """Motion of it under the looped engine."""
+def simulate_force(force: str, t_end: float, **options: Any) -> mstmm.Result:
+    """Run of the mass on its rail under a force, on the looped engine."""
     return mstmm.compile(on_a_rail(force), engine="looped").simulate(t_end, **options)
 
 
 @pytest.mark.parametrize("method", ["dopri5", "dop853", "pirk13", "scipy-RK45"])
 def test_an_oscillating_force_is_seen(method: str) -> None:
-    result = pushed("100*sin(200*t)", 1.0, method=method)
+    result = simulate_force("100*sin(200*t)", 1.0, method=method)
     assert result.u[-1, 0] == pytest.approx((1 - np.cos(200.0)) / 2, abs=1e-7)
 
 
@@ -51,14 +51,14 @@ PULSES = {
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("force", PULSES)
 def test_a_narrow_pulse_moves_a_body_at_rest(force: str, method: str) -> None:
-    result = pushed(force, 10.0, method=method)
+    result = simulate_force(force, 10.0, method=method)
     assert result.success
     assert result.u[-1, 0] == pytest.approx(PULSES[force], rel=2e-6 if "Radau" in method else 1e-7)
 
 
 @pytest.mark.parametrize("force", PULSES)
 def test_the_estimate_covers_the_error(force: str) -> None:
-    result = pushed(force, 10.0, certify=True)
+    result = simulate_force(force, 10.0, certify=True)
     error = result.certificate.error
     assert error is not None
     assert abs(result.u[-1, 0] - PULSES[force]) <= error.largest("u")["m/s"] + 1e-11
@@ -84,37 +84,37 @@ def test_a_drive_moves_at_once_and_is_followed() -> None:
 
 def test_a_pole_is_not_passed() -> None:
     for method in ("dopri5", "dop853", "pirk13"):
-        result = pushed("1/(t - 0.5)", 1.0, method=method)
+        result = simulate_force("1/(t - 0.5)", 1.0, method=method)
         assert not result.success and result.last_state[0] <= 0.5
 
 
 def test_a_fixed_step_that_may_miss_a_pulse_is_told() -> None:
     force = "100*exp(-((t - 5.03)/0.005)^2)"
-    result = pushed(force, 10.0, method="rk4", step=0.1, certify=True)
+    result = simulate_force(force, 10.0, method="rk4", step=0.1, certify=True)
     (text,) = [t for t in result.warnings if "fixed" in t]
     assert not result.trusted
     assert 'too long for load "load1", which near t = 5.0' in text
-    assert not pushed(force, 10.0, method="rk4", step=0.001).warnings
+    assert not simulate_force(force, 10.0, method="rk4", step=0.001).warnings
 
 
 def test_the_second_run_looks_elsewhere() -> None:
     """Nothing moves: the first run makes long steps, the second one shorter ones."""
     from mstmm.runtime.run.error_estimate import reference_settings
 
-    run = pushed("0*t", 10.0).trajectory
+    run = simulate_force("0*t", 10.0).trajectory
     second, _ = reference_settings(run)
     assert run.statistics.largest_step is not None
     assert 0 < second.max_step < 0.4 * run.statistics.largest_step
 
 
 def test_max_step_bounds_every_step() -> None:
-    result = pushed("0*t", 10.0, method=mstmm.methods.Method(max_step=0.1))
+    result = simulate_force("0*t", 10.0, method=mstmm.methods.Method(max_step=0.1))
     assert np.diff(result.t).max() <= 0.1 * (1 + 1e-12)
 
 
 def test_a_huge_force_that_switches_is_met() -> None:
     """Where the time of a switch is known to rounding alone, no error is asked for."""
-    result = pushed("where(sin(t) > 0.5, 1e12, 0)", 3.0)
+    result = simulate_force("where(sin(t) > 0.5, 1e12, 0)", 3.0)
     assert result.success
     assert result.u[-1, 0] == pytest.approx(1e12 * 2 * np.pi / 3, rel=1e-9)
 

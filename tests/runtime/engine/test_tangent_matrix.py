@@ -39,7 +39,7 @@ def flexible(rng: Generator, planar: bool) -> tuple[Scene, Array, Array]:
     return engine_scenes.drawn(int(rng.integers(2**32)), planar, 3)
 
 
-def compiled(scene: Scene) -> tuple[mstmm.Model, TangentMatrix]:
+def model_and_tangent(scene: Scene) -> tuple[mstmm.Model, TangentMatrix]:
     model = mstmm.compile(mstmm.Scene(**scene), engine="looped")
     return model, TangentMatrix(model.looped)
 
@@ -67,7 +67,7 @@ def worst(found: Array, expected: Array) -> float:
 
 
 def check_direction(scene: Scene, q: Array, u: Array, rng: Generator) -> None:
-    _, tangent = compiled(scene)
+    _, tangent = model_and_tangent(scene)
     a = rng.normal(size=tangent.nu)
     direction: tuple[Any, ...] = (
         1.0,
@@ -78,8 +78,8 @@ def check_direction(scene: Scene, q: Array, u: Array, rng: Generator) -> None:
     assert worst(tangent.slope(*direction), expected) < 1e-8
 
 
-def factored(tangent: TangentMatrix) -> float:
-    """The inverse step of the tangent that has been factored."""
+def factor_tangent(tangent: TangentMatrix) -> float:
+    """Factor the tangent at the first inverse step that succeeds, and return that step."""
     for step in INVERSE_STEPS:
         try:
             tangent.factor(step, step, SHARE)
@@ -100,9 +100,9 @@ def dense(tangent: TangentMatrix, step: float) -> tuple[Array, Any]:
 
 
 def check_solution(scene: Scene, q: Array, u: Array, rng: Generator) -> None:
-    _, tangent = compiled(scene)
+    _, tangent = model_and_tangent(scene)
     tangent.residual(TIME, q, u, rng.normal(size=tangent.nu))
-    matrix, rows = dense(tangent, factored(tangent))
+    matrix, rows = dense(tangent, factor_tangent(tangent))
     right, expected = rng.normal(size=tangent.nu), np.zeros(tangent.nu)
     free = matrix[np.ix_(rows, rows)]
     expected[rows] = np.linalg.solve(free, right[rows])
@@ -153,7 +153,7 @@ def test_solution_of_flexible_trees(draw: int, rng: Generator) -> None:
 def test_direction_by_derivatives_of_accelerations(draw: int, rng: Generator) -> None:
     """Where R = 0 its derivatives are those of the accelerations times -M, found by other code."""
     scene, q, u = rigid(rng)
-    model, tangent = compiled(scene)
+    model, tangent = model_and_tangent(scene)
     found, mass = model.derivatives(q, u, t=TIME), model.mass_matrix(q)
     tangent.residual(TIME, q, u, found.udot)
     none_q, none_u = np.zeros(tangent.nq), np.zeros(tangent.nu)
@@ -170,7 +170,7 @@ def test_stiff_springs_lose_nothing(stiffness: float, rng: Generator) -> None:
     scene = random_scenes.aligned_chain(3, ("planar",) * 6)
     for hinge in scene["hinge"]:
         hinge["law"] = {"stiffness": [stiffness, stiffness, 1.0]}
-    model, tangent = compiled(scene)
+    model, tangent = model_and_tangent(scene)
     q, u = 1e-3 * rng.normal(size=model.nq), rng.normal(size=model.nu)
     tangent.residual(TIME, q, u, rng.normal(size=model.nu))
     tangent.factor(1e3, 1e3, SHARE)
@@ -184,7 +184,7 @@ def test_change_of_coordinates_follows_the_rates(rng: Generator) -> None:
     """sq dq = g_q dq + N du + rho: a ball's quaternion, whose rates depend on itself."""
     scene = random_scenes.random_scene(5, most=4, types=("ball", "free", "universal"))
     q, u = random_scenes.random_state(scene, 5)
-    model, tangent = compiled(scene)
+    model, tangent = model_and_tangent(scene)
     tangent.residual(TIME, q, u, np.zeros(model.nu))
     tangent.factor(50.0, 60.0, 1.0)
     du, rho = rng.normal(size=model.nu), rng.normal(size=model.nq)
@@ -203,7 +203,7 @@ def test_hinges_without_kernels_that_do_several_steps_in_one(rng: Generator) -> 
     types = ("ball", "free", "universal", "pin", "planar", "screw", "cylindrical", "gimbal")
     scene = random_scenes.random_scene(5, most=12, types=types)
     q, u = random_scenes.random_state(scene, 5)
-    model, tangent = compiled(scene)
+    model, tangent = model_and_tangent(scene)
     right = rng.normal(size=model.nu)
 
     def answers() -> tuple[Array, Array]:
@@ -227,7 +227,7 @@ def test_undetermined_motion_is_named() -> None:
         "body": [{"name": "rod", "mass": 1.0, "inertia": [1.0, 1.0, 1.0]}],
         "hinge": [{"name": "eye", "type": "gimbal", "inboard": "ground", "outboard": "rod"}],
     }
-    _, tangent = compiled(scene)
+    _, tangent = model_and_tangent(scene)
     still = np.zeros(3)
     tangent.residual(0.0, np.array([0.2, np.pi / 2, 0.1]), still, still)
     with pytest.raises(NumericalFailure, match=r'hinge "eye".*undetermined'):
@@ -266,7 +266,7 @@ def pushed_everywhere(count: int) -> tuple[Scene, Array, Array]:
 def test_loads_that_feel_their_body_alone_are_eliminated(rng: Generator) -> None:
     """A load on each of many bodies leaves nothing to close behind the sweep."""
     scene, q, u = pushed_everywhere(30)
-    assert compiled(scene)[1].off_tree_count == 0
+    assert model_and_tangent(scene)[1].off_tree_count == 0
     check_solution(scene, q, u, rng)
 
 
@@ -274,7 +274,7 @@ def test_tangent_is_the_same_whatever_was_asked_before(rng: Generator) -> None:
     """Directions leave their marks in the workspaces, of which the elimination must not know."""
     scene, q, u = pushed_everywhere(4)
     scene["spring"].append({"from": "rod0.tip", "to": "rod3.tip", "law": {"stiffness": 50.0}})
-    _, tangent = compiled(scene)
+    _, tangent = model_and_tangent(scene)
     a, right = rng.normal(size=tangent.nu), rng.normal(size=tangent.nu)
 
     def answer() -> Array:
@@ -290,7 +290,7 @@ def test_tangent_is_the_same_whatever_was_asked_before(rng: Generator) -> None:
 def test_the_ground_rests_whatever_stood_in_its_place(rng: Generator) -> None:
     """A sweep begins the ground's own numbers anew."""
     scene, q, u = pushed_everywhere(4)
-    _, tangent = compiled(scene)
+    _, tangent = model_and_tangent(scene)
     a = rng.normal(size=tangent.nu)
     expected = tangent.residual(TIME, q, u, a).copy()
     tangent.workspace[: tangent.engine.lib.MSTMM_BLOCK_FIXED] = np.nan

@@ -75,8 +75,8 @@ def differences(f: Callable[[float], Array], h: float) -> Array:
     return (8 * (f(h) - f(-h)) - (f(2 * h) - f(-2 * h))) / (12 * h)
 
 
-def beside(model: mstmm.Model, off: float) -> tuple[Array, Array]:
-    """A state so far from the start, whose speeds do not fit the loops either."""
+def perturbed_state(model: mstmm.Model, off: float) -> tuple[Array, Array]:
+    """A state at a distance `off` from the start, whose speeds violate the loops too."""
     q, u = model.initial_state()
     return q + off * RNG.normal(size=len(q)), u + 100 * off * RNG.normal(size=len(u))
 
@@ -85,7 +85,7 @@ def beside(model: mstmm.Model, off: float) -> tuple[Array, Array]:
 def test_a_step(case: tuple[mstmm.Model, float, float], apart: bool) -> None:
     """Increments of a step obey the derivatives of the accelerations themselves."""
     model, s, off = case
-    q, u = beside(model, off if apart else 0.0)
+    q, u = perturbed_state(model, off if apart else 0.0)
     tangent = TangentMatrix(model.looped)
     assert np.abs(tangent.residual(0.3, q, u)).max() < 1e-10
     tangent.factor(s, s)
@@ -110,7 +110,7 @@ def hinge_is_driven(model: mstmm.Model, speed: int) -> bool:
 def test_time(case: tuple[mstmm.Model, float, float]) -> None:
     """What the accelerations change by with the time alone: efforts and drives."""
     model, _, off = case
-    q, u = beside(model, off)
+    q, u = perturbed_state(model, off)
     tangent = TangentMatrix(model.looped)
     tangent.residual(0.3, q, u)
     found = tangent.accelerations_rate()

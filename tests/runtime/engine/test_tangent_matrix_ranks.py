@@ -33,7 +33,12 @@ def chain(rng: np.random.Generator, kind: str, count: int, **more: Any) -> Scene
          "ends": {"tip": rng.uniform(-1.0, 1.0, 3).tolist()}}
         for k in range(count)
     ]  # fmt: skip
-    return {"gravity": [0, -9.81, 0], "body": bodies, "hinge": joined(kind, count, "body"), **more}
+    return {
+        "gravity": [0, -9.81, 0],
+        "body": bodies,
+        "hinge": serial_hinges(kind, count, "body"),
+        **more,
+    }
 
 
 def beams(rng: np.random.Generator) -> Scene:
@@ -44,10 +49,10 @@ def beams(rng: np.random.Generator) -> Scene:
          "polar_inertia_per_length": 0.1, "modes": {"y": 1, "z": 1}}
         for k in range(6)
     ]  # fmt: skip
-    return {"gravity": [0, -9.81, 0], "beam": made, "hinge": joined("ball", 6, "beam")}
+    return {"gravity": [0, -9.81, 0], "beam": made, "hinge": serial_hinges("ball", 6, "beam")}
 
 
-def joined(kind: str, count: int, stem: str) -> list[Scene]:
+def serial_hinges(kind: str, count: int, stem: str) -> list[Scene]:
     return [
         {"name": f"hinge{k}", "type": kind, "outboard": f"{stem}{k}",
          "inboard": f"{stem}{k - 1}.tip" if k else "ground"}

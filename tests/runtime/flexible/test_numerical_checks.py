@@ -13,8 +13,8 @@ HELD = {"name": "h", "type": "fixed", "inboard": "ground", "outboard": "b"}
 STEP = [{"from": 0.0, "to": 1.0, "mass_per_length": 4.0}, {"from": 1.0, "to": 3.0}]
 
 
-def held(**beam: Any) -> mstmm.Model:
-    """A beam "b" on the ground, length 1, mass 1 and EI 1 unless said."""
+def clamped_beam_model(**beam: Any) -> mstmm.Model:
+    """A clamped beam "b" of length 1, mass 1 and EI 1 unless given otherwise."""
     table = {"name": "b", "length": 1.0, "bending_stiffness": 1.0, "modes": {"y": 2}, **beam}
     table |= {} if "section" in table else {"mass_per_length": beam.get("mass_per_length", 1.0)}
     return mstmm.compile(
@@ -22,15 +22,21 @@ def held(**beam: Any) -> mstmm.Model:
     )
 
 
-def stepped(mass: float) -> dict[str, Any]:
+def stepped_beam_keys(mass: float) -> dict[str, Any]:
     return {"length": 3.0, "section": [STEP[0], STEP[1] | {"mass_per_length": mass}]}
 
 
 @pytest.mark.parametrize(
     ("beam", "said"),
     [
-        (stepped(1e-300), r'beam "b": section\[1\].mass_per_length: expected 1e-12 of the largest'),
-        (stepped(5e-324), r'beam "b": section\[1\].mass_per_length: expected 1e-12 of the largest'),
+        (
+            stepped_beam_keys(1e-300),
+            r'beam "b": section\[1\].mass_per_length: expected 1e-12 of the largest',
+        ),
+        (
+            stepped_beam_keys(5e-324),
+            r'beam "b": section\[1\].mass_per_length: expected 1e-12 of the largest',
+        ),
         (
             {"torsional_stiffness": 5e-324, "polar_inertia_per_length": 1e-3,
              "modes": {"y": 2, "twist": 1}},
@@ -42,18 +48,21 @@ def stepped(mass: float) -> dict[str, Any]:
 )  # fmt: skip
 def test_a_beam_whose_numbers_lie_too_far_apart(beam: dict[str, Any], said: str) -> None:
     with pytest.raises(mstmm.SceneError, match=said):
-        held(**beam)
+        clamped_beam_model(**beam)
 
 
 @pytest.mark.parametrize("length", [1e13, 1e-9])
 def test_a_beam_of_any_length_has_its_pieces(length: float) -> None:
     """A rule of its own length: frequencies scale exactly."""
-    body, unit = held(length=length).flexible_bodies["b"], held().flexible_bodies["b"]
+    body, unit = (
+        clamped_beam_model(length=length).flexible_bodies["b"],
+        clamped_beam_model().flexible_bodies["b"],
+    )
     assert np.diag(body.K) * length**3 == pytest.approx(np.diag(unit.K), rel=1e-9)
 
 
 def test_a_piece_a_million_times_lighter_is_a_beam() -> None:
-    assert held(**stepped(4e-6)).simulate(1e-3, rtol=1e-5).success
+    assert clamped_beam_model(**stepped_beam_keys(4e-6)).simulate(1e-3, rtol=1e-5).success
 
 
 def soft(**change: Any) -> mstmm.Model:

@@ -65,7 +65,7 @@ def test_the_whole_deflection_is_that_of_a_bar(load: list[float]) -> None:
     assert apart == pytest.approx(exact, rel=1e-3)
 
 
-def told(scene: mstmm.Scene, t_end: float) -> list[str]:
+def shape_warnings(scene: mstmm.Scene, t_end: float) -> list[str]:
     run = mstmm.compile(scene, engine="looped").simulate(t_end, rtol=1e-5)
     assert run.certificate.flexible_bodies[0].tail is not None
     return [text for text in run.warnings if "miss" in text]
@@ -74,10 +74,10 @@ def told(scene: mstmm.Scene, t_end: float) -> list[str]:
 def test_a_run_whose_shapes_cannot_carry_its_loads_is_doubted() -> None:
     """A moment at an end without static shapes, raised slowly; with them nothing is missed."""
     load = [{"on": "e.tip", "moment": [0, 0, "20*(1 - cos(30*t))"]}]
-    poor, good = (told(bar("fixed", static, load=load), 0.1) for static in (False, True))
+    poor, good = (shape_warnings(bar("fixed", static, load=load), 0.1) for static in (False, True))
     assert len(poor) == 1 and "deflection of its ends" in poor[0] and not good
 
 
 @pytest.mark.parametrize("hinge", ["fixed", "pin"])
 def test_weight_is_carried_by_default_shapes(hinge: str) -> None:
-    assert not told(bar(hinge, gravity=[0, -9.81, 0]), 0.05)
+    assert not shape_warnings(bar(hinge, gravity=[0, -9.81, 0]), 0.05)

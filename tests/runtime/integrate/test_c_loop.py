@@ -15,7 +15,7 @@ from tests.support.integration.compiled_systems import Lab, same_bits
 ADAPTIVE = ("dopri5", "dop853")
 
 
-def ended(run: Integrator, status: Status) -> str:
+def final_message(run: Integrator, status: Status) -> str:
     """The message of a run that ends with `status` and stays ended."""
     assert run.advance(20.0) is status
     state, t = run.y, run.t
@@ -30,7 +30,7 @@ def ended(run: Integrator, status: Status) -> str:
 def test_overflow_ends_not_finite(lab: Lab, method: str) -> None:
     # y = exp(100 t) leaves the numbers at t = 7.098
     run = lab.problem("growth", 2, 100.0).run(method, 10.0, (1.0, 0.0), rtol=1e-6)
-    message = ended(run, Status.NOT_FINITE)
+    message = final_message(run, Status.NOT_FINITE)
     assert run.failure is not None
     assert run.failure.component == 0
     assert 7.0 < run.failure.time < 7.1
@@ -42,7 +42,7 @@ def test_overflow_with_fixed_steps_keeps_the_last_good_state(lab: Lab) -> None:
     run = lab.problem("growth", 2, 1000.0).run("rk4", 10.0, (0.0, 1.0), step=0.1)
     assert run.advance() is Status.FINISHED
     run = lab.problem("growth", 2, 1000.0).run("rk4", 100.0, (1.0, 1.0), step=0.1)
-    message = ended(run, Status.NOT_FINITE)
+    message = final_message(run, Status.NOT_FINITE)
     assert "calm" in message
     assert run.t == pytest.approx(run.samples.t[-1])
     assert run.failure is not None
@@ -53,7 +53,7 @@ def test_overflow_with_fixed_steps_keeps_the_last_good_state(lab: Lab) -> None:
 def test_a_singularity_ends_with_a_step_too_small(lab: Lab, method: str) -> None:
     # y' = y^2 from 1: y = 1 / (1 - t)
     run = lab.problem("blow_up", 2).run(method, 2.0, (1.0, 1.0), rtol=1e-9, atol=1e-9)
-    message = ended(run, Status.STEP_TOO_SMALL)
+    message = final_message(run, Status.STEP_TOO_SMALL)
     assert run.t == pytest.approx(1.0, abs=1e-8)
     assert run.failure is not None
     assert run.failure.component == 1
@@ -63,7 +63,7 @@ def test_a_singularity_ends_with_a_step_too_small(lab: Lab, method: str) -> None
 @pytest.mark.parametrize("method", ADAPTIVE)
 def test_a_failing_right_hand_side_is_approached_then_passed_on(lab: Lab, method: str) -> None:
     run = lab.problem("failing", 2, 1.0).run(method, 2.0, (0.0, 0.0), rtol=1e-9)
-    message = ended(run, Status.RHS_FAILED)
+    message = final_message(run, Status.RHS_FAILED)
     assert run.failure is not None
     assert run.failure.code == 7
     assert run.failure.time == pytest.approx(1.0, abs=1e-9)
@@ -75,7 +75,7 @@ def test_a_failing_right_hand_side_is_approached_then_passed_on(lab: Lab, method
 
 def test_a_failing_right_hand_side_ends_a_fixed_step_at_once(lab: Lab) -> None:
     run = lab.problem("failing", 2, 1.05).run("rk4", 2.0, (0.0, 0.0), step=0.1)
-    ended(run, Status.RHS_FAILED)
+    final_message(run, Status.RHS_FAILED)
     assert run.t == pytest.approx(1.0)
     assert run.failure is not None
     assert run.failure.time == pytest.approx(1.1)
@@ -83,11 +83,11 @@ def test_a_failing_right_hand_side_ends_a_fixed_step_at_once(lab: Lab) -> None:
 
 def test_a_nan_stage_is_approached_then_not_finite(lab: Lab) -> None:
     run = lab.problem("failing", 2, 1.0, 1.0).run("dop853", 2.0, (0.0, 0.0), rtol=1e-9)
-    message = ended(run, Status.NOT_FINITE)
+    message = final_message(run, Status.NOT_FINITE)
     assert "wild" in message
     assert run.t == pytest.approx(1.0, abs=1e-9)
     first = lab.problem("failing", 2, -1.0, 1.0).run("rk4", 2.0, (0.0, 0.0), step=0.1)
-    ended(first, Status.NOT_FINITE)
+    final_message(first, Status.NOT_FINITE)
     assert first.t == 0.0
 
 
@@ -104,7 +104,7 @@ def test_accept_may_fail(lab: Lab) -> None:
     lab.lib.test_use_accept(problem.system, problem.at)
     problem.at.p[7] = 9.0
     run = problem.run("dop853", 1.0, (1.0, 0.0), rtol=1e-6)
-    message = ended(run, Status.ACCEPT_FAILED)
+    message = final_message(run, Status.ACCEPT_FAILED)
     assert "(code 9)" in message
     assert run.t == 0.0
     assert problem.at.memory[1] == 0.0  # as before the failing call
@@ -112,14 +112,14 @@ def test_accept_may_fail(lab: Lab) -> None:
 
 def test_steps_can_be_limited(lab: Lab) -> None:
     run = lab.problem("harmonic", 2, 1.0).run("rk4", 100.0, (1, 0), step=0.1, max_steps=25)
-    assert "more steps than allowed" in ended(run, Status.TOO_MANY_STEPS)
+    assert "more steps than allowed" in final_message(run, Status.TOO_MANY_STEPS)
     assert run.statistics.steps == 25
     run = lab.problem("harmonic", 2, 1.0).run("dop853", 10.0, (1, 0), max_step=0.01)
     assert run.advance(10.0) is Status.FINISHED
     assert run.statistics.largest_step is not None
     assert run.statistics.largest_step <= 0.01 + 1e-15
     run = lab.problem("harmonic", 2, 1.0).run("dopri5", 10.0, (1, 0), rtol=1e-13, min_step=0.5)
-    assert "step too small" in ended(run, Status.STEP_TOO_SMALL)
+    assert "step too small" in final_message(run, Status.STEP_TOO_SMALL)
 
 
 def test_a_run_of_no_length_has_one_sample(lab: Lab) -> None:

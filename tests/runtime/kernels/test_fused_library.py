@@ -21,7 +21,7 @@ KEY = "5" * 64
 MIXED = ["free", "pin", "ball", "prismatic"]
 
 
-def compiled(text: str, folder: Path, compiler: str = COMPILERS[0]) -> Path:
+def compile_source(text: str, folder: Path, compiler: str = COMPILERS[0]) -> Path:
     source, target = folder / "fused.c", folder / "fused.so"
     source.write_text(text)
     strict = ("-Wall", "-Wextra", "-Wmissing-prototypes", "-Werror")
@@ -49,8 +49,8 @@ def test_one_state_and_many(
 ) -> None:
     _, p = structure_of(model.packed_scene.system, model.known or {})
     (tmp_path / "lanes").mkdir()
-    scalar = open_library(compiled(text_of(model, "scalar"), tmp_path, compiler), KEY)
-    lanes = open_library(compiled(text_of(model, "lanes"), tmp_path / "lanes", compiler), KEY)
+    scalar = open_library(compile_source(text_of(model, "scalar"), tmp_path, compiler), KEY)
+    lanes = open_library(compile_source(text_of(model, "lanes"), tmp_path / "lanes", compiler), KEY)
     states = [drawn_state(chain(MIXED, skew=0.4), rng) for _ in range(11)]
     q, u = (np.array([state[k] for state in states]) for k in (0, 1))
     wanted = model.accelerations(q, u)
@@ -71,7 +71,7 @@ def test_one_state_and_many(
 def test_every_state_may_have_its_own_row(model: mstmm.Model, tmp_path: Path) -> None:
     """Strides of p, t, memory and efforts: a row for each state equals one row for all."""
     _, p = structure_of(model.packed_scene.system, model.known or {})
-    library = open_library(compiled(text_of(model, "lanes"), tmp_path), KEY)
+    library = open_library(compile_source(text_of(model, "lanes"), tmp_path), KEY)
     q0, u0 = drawn_state(chain(MIXED, skew=0.4), np.random.default_rng(2))
     n = 5
     q, u, memory = np.tile(q0, (n, 1)), np.tile(u0, (n, 1)), np.zeros(max(1, library.n_memory))
@@ -90,7 +90,7 @@ def test_every_state_may_have_its_own_row(model: mstmm.Model, tmp_path: Path) ->
 
 def test_prepared_calls(model: mstmm.Model, tmp_path: Path) -> None:
     _, p = structure_of(model.packed_scene.system, model.known or {})
-    library = open_library(compiled(text_of(model, "scalar"), tmp_path), KEY)
+    library = open_library(compile_source(text_of(model, "scalar"), tmp_path), KEY)
     q, u = drawn_state(chain(MIXED, skew=0.4), np.random.default_rng(3))
     call = SingleStateCall(library, p)
     call.q[:], call.u[:] = q, u
@@ -101,24 +101,24 @@ def test_prepared_calls(model: mstmm.Model, tmp_path: Path) -> None:
     assert not np.array_equal(first, call.udot)
 
 
-def refused(path: Path, key: str, match: str) -> None:
+def check_refusal(path: Path, key: str, match: str) -> None:
     with pytest.raises(EnvironmentFailure, match=match):
         open_library(path, key)
 
 
 def test_files_that_are_no_such_library(model: mstmm.Model, tmp_path: Path) -> None:
-    refused(tmp_path / "missing.so", KEY, "cannot be loaded")
+    check_refusal(tmp_path / "missing.so", KEY, "cannot be loaded")
     text = text_of(model, "scalar")
-    whole = compiled(text, tmp_path)
+    whole = compile_source(text, tmp_path)
     assert isinstance(open_library(whole, KEY), FusedLibrary)
-    refused(whole, "6" * 64, "key 5555.*expected 6666")
+    check_refusal(whole, "6" * 64, "key 5555.*expected 6666")
     empty = tmp_path / "empty.so"
     empty.write_bytes(b"")
-    refused(empty, KEY, "cannot be loaded")
+    check_refusal(empty, KEY, "cannot be loaded")
     for name, old, new, match in (
         ("older", f".abi = {fused_abi.ABI_VERSION}", ".abi = 1", "layout 1, this mstmm has"),
         ("other", fused_abi.SYMBOL, "something_else", "no fused library"),
     ):
         folder = tmp_path / name
         folder.mkdir()
-        refused(compiled(text.replace(old, new), folder), KEY, match)
+        check_refusal(compile_source(text.replace(old, new), folder), KEY, match)

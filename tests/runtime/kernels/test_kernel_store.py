@@ -24,7 +24,7 @@ KNEE = {"type": "knee", "parameters": {"width": 0.06, "depth": 0.03, "slip": 0.4
 
 
 @pytest.fixture(scope="module")
-def generated(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def knee_store(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A store with the knee, generated once."""
     folder = tmp_path_factory.mktemp("store")
     with pytest.MonkeyPatch.context() as patch:
@@ -36,9 +36,9 @@ def generated(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def library(generated: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def library(knee_store: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The library of a copy of that store, as a new process would meet it."""
-    shutil.copytree(generated, tmp_path / "store")
+    shutil.copytree(knee_store, tmp_path / "store")
     monkeypatch.setenv("MSTMM_KERNELS", str(tmp_path / "store"))
     monkeypatch.delenv("CC", raising=False)
     kernel_store.open_element.cache_clear()
@@ -58,8 +58,8 @@ def accelerations() -> tuple[str, Any]:
     return how, model.accelerations(np.array([[0.3], [-0.8]]), np.array([[1.0], [-2.0]]))
 
 
-def replaced(library: Path, content: bytes) -> None:
-    """Another file under its name; whoever has it open keeps the old one."""
+def replace_file(library: Path, content: bytes) -> None:
+    """Replace the file under its name; processes that have it open keep the old one."""
     library.unlink()
     library.write_bytes(content)
 
@@ -71,7 +71,7 @@ def test_damaged_library_is_built_again_from_its_text(library: Path) -> None:
     flipped = bytearray(content)
     flipped[len(content) // 2] ^= 1
     for damaged in (content[:1000], b"", bytes(flipped)):
-        replaced(library, damaged)
+        replace_file(library, damaged)
         kernel_store.open_element.cache_clear()
         how, found = accelerations()
         assert how == "library" and np.array_equal(found, expected)
@@ -82,7 +82,7 @@ def test_damaged_library_without_a_compiler_is_interpreted(
     library: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     _, expected = accelerations()
-    replaced(library, library.read_bytes()[:1000])
+    replace_file(library, library.read_bytes()[:1000])
     monkeypatch.setenv("CC", "/nonexistent")
     kernel_store.open_element.cache_clear()
     how, found = accelerations()

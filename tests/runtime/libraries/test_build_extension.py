@@ -156,7 +156,7 @@ def test_what_is_compiled_already_is_not_compiled_again(
     compiler.chmod(0o755)
     monkeypatch.setenv("CC", str(compiler))
 
-    def compiled() -> int:
+    def compiler_calls() -> int:
         """How often the compiler was called for an object; nothing but the module is left of the
         last build, as after an install."""
         calls.write_text("")
@@ -166,12 +166,12 @@ def test_what_is_compiled_already_is_not_compiled_again(
         assert done.returncode == 0, done.stderr
         return sum(" -c " in f" {line} " for line in calls.read_text().splitlines())
 
-    assert (compiled(), compiled()) == (3, 0)
+    assert (compiler_calls(), compiler_calls()) == (3, 0)
     source = project / "generated" / "twice.c"
     source.write_text(source.read_text().replace("2 *", "3 *"))
-    assert (compiled(), compiled()) == (3, 0)
+    assert (compiler_calls(), compiler_calls()) == (3, 0)
     (project / "mstmm" / "generated" / "_kernels.abi3.so").write_bytes(b"")
-    assert (compiled(), compiled()) == (3, 0)
+    assert (compiler_calls(), compiler_calls()) == (3, 0)
 
 
 def test_a_folder_without_c_says_how_to_get_it(project: Path) -> None:

@@ -162,11 +162,11 @@ def _cut(library: Path) -> None:
     library.write_bytes(library.read_bytes()[:-100])
 
 
-def _emptied(library: Path) -> None:
+def _empty_file(library: Path) -> None:
     library.write_bytes(b"")
 
 
-def _flipped(library: Path) -> None:
+def _flip_bit(library: Path) -> None:
     content = bytearray(library.read_bytes())
     content[len(content) // 2] ^= 4
     library.write_bytes(content)
@@ -178,11 +178,11 @@ def _of_another(library: Path) -> None:
         (library.parent / path.name).write_bytes(path.read_bytes())
 
 
-def _undescribed(library: Path) -> None:
+def _delete_description(library: Path) -> None:
     (library.parent / "entry.json").unlink()
 
 
-def _garbled(library: Path) -> None:
+def _garble_description(library: Path) -> None:
     (library.parent / "entry.json").write_bytes(b'{"format": 1, "key": \xff')
 
 
@@ -205,11 +205,11 @@ def _a_file(library: Path) -> None:
 
 DAMAGES = {
     "bytes of": _cut,
-    "0 bytes": _emptied,
-    "checksum": _flipped,
+    "0 bytes": _empty_file,
+    "checksum": _flip_bit,
     "another scene": _of_another,
-    "missing": _undescribed,
-    "cannot be read": _garbled,
+    "missing": _delete_description,
+    "cannot be read": _garble_description,
     "another layout": _older_layout,
     "another folder": _pointing_away,
     "description": _a_file,

@@ -47,8 +47,8 @@ class Crowd:
         assert all(line[0] == "child" for line in lines)
         self.pids = [int(line[1]) for line in lines]
 
-    def said(self) -> list[str]:
-        """The lines of all that lived to say something."""
+    def output_lines(self) -> list[str]:
+        """Lines that the processes have printed, once all have ended."""
         rest = self.output.read()
         assert self.process.wait() == 0
         self.output.close()
@@ -70,7 +70,7 @@ def test_sixteen_want_the_same(
     cache_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("CC", str(counting_compiler(tmp_path, "sleep 0.1")))
-    said = Crowd([3] * 16).said()
+    said = Crowd([3] * 16).output_lines()
     assert Counter(line.split()[2] for line in said) == {"compiled": 1, "cached": 15}
     assert all(line.split()[:2] == ["3", "21"] for line in said)
     assert runs(tmp_path) == 2  # one compilation, one question for the version
@@ -89,7 +89,7 @@ def test_sixteen_want_five_and_some_are_killed(
         time.sleep(float(rng.uniform(0.0, 0.12)))
         with contextlib.suppress(ProcessLookupError):  # it has done its work already
             os.kill(int(pid), signal.SIGKILL)
-    said = crowd.said()
+    said = crowd.output_lines()
     assert 9 <= len(said) <= 16
     for line in said:
         factor, value, how, *note = line.split()
@@ -108,11 +108,11 @@ def test_sixteen_want_five_and_some_are_killed(
 def _wait_for_orphans(folder: Path) -> None:
     """Compilers of killed processes go on for a moment, in folders of their own."""
 
-    def gone() -> bool:
+    def have_orphans_ended() -> bool:
         commands = (path / "cmdline" for path in Path("/proc").glob("[0-9]*"))
         return not any(str(folder).encode() in _content(path) for path in commands)
 
-    _until(gone)
+    _until(have_orphans_ended)
 
 
 def _content(path: Path) -> bytes:
@@ -143,7 +143,7 @@ def test_lock_and_compiler_end_with_their_killed_owner(
     started = [int((tmp_path / "pass").read_text()), *map(int, os.listdir(tmp_path / "marks"))]
     assert all(alive(pid) for pid in started)
     os.kill(crowd.pids[0], signal.Signals[which])
-    assert crowd.said() == []
+    assert crowd.output_lines() == []
     _until(lambda: not any(alive(pid) for pid in started))
     remains = int(which != "SIGINT")  # Python leaves its blocks there, and cleans up
     assert count_unfinished_builds(cache_folder) == remains and entry_folders(cache_folder) == []

@@ -47,7 +47,7 @@ def test_a_platform_that_moves_is_a_ground_that_moves(cut: str) -> None:
     assert np.abs(found - wanted).max() < 1e-10 * np.abs(wanted).max()
 
 
-def turned(value: float, *rates: float, cut: str = "top") -> mstmm.Model:
+def driven_five_bar(value: float, *rates: float, cut: str = "top") -> mstmm.Model:
     """A five-bar whose second crank a drive turns: all hinges go along with it."""
     scene = five_bar({})
     laws: dict[int, dict[str, Any]] = {
@@ -71,14 +71,14 @@ def turned(value: float, *rates: float, cut: str = "top") -> mstmm.Model:
 
 @pytest.fixture(scope="module")
 def driven() -> mstmm.Model:
-    return turned(1.0, 0, 0)
+    return driven_five_bar(1.0, 0, 0)
 
 
 def test_equilibria_follow_the_drive(driven: mstmm.Model) -> None:
     """K x = - K_d d, by central differences between equilibria."""
     linear = driven.linearize(inputs=["foot1.angle_acceleration"])
     q, size, place = np.asarray(linear.state.q), 1e-4, linear.free_speed_indices[0]
-    ends = [turned(1.0 + s * size, 0, 0).equilibrium(q) for s in (1, -1)]
+    ends = [driven_five_bar(1.0 + s * size, 0, 0).equilibrium(q) for s in (1, -1)]
     slope = (ends[0] - ends[1])[place] / (2 * size)
     wanted = -np.linalg.solve(linear.K, linear.K_prescribed)[0, 0]
     assert abs(slope / wanted - 1) < 1e-6
@@ -95,12 +95,12 @@ def test_accelerations_follow_the_drive(driven: mstmm.Model) -> None:
     mechanism = linear.constrained_motion
     assert mechanism is not None
     still = np.zeros(driven.nu)
-    pushed = turned(1.0, 0, 1.0).accelerations(q, still)[place]
+    pushed = driven_five_bar(1.0, 0, 1.0).accelerations(q, still)[place]
     assert abs(pushed / np.linalg.solve(linear.M, linear.V)[0, 0] - 1) < 1e-9
     rows = mechanism.rows(linear.state, {0: np.eye(driven.nu)}, [linear.drive_indices[0]])[0]
     along = rows[:, linear.drive_indices[0]]
     size = 1e-4
-    going = [turned(1.0, s * size, 0).accelerations(q, s * size * along)[place]
+    going = [driven_five_bar(1.0, s * size, 0).accelerations(q, s * size * along)[place]
              for s in (1, -1)]  # fmt: skip
     slope = (going[0] - going[1]) / (2 * size)
     wanted = -np.linalg.solve(linear.M, linear.C_prescribed)[0, 0]
@@ -122,7 +122,7 @@ def test_states_and_frequencies_agree(driven: mstmm.Model) -> None:
 
 
 def test_a_driven_hinge_may_be_the_cut_one(driven: mstmm.Model) -> None:
-    other = turned(1.0, 0, 0, cut="foot1")
+    other = driven_five_bar(1.0, 0, 0, cut="foot1")
     assert "foot1" in other.loops.cut_hinges
     outputs = ["foot0.angle", "link1.tip.velocity.y"]
     here, there = (one.frequency_response(OMEGA, ["turn"], outputs) for one in (driven, other))

@@ -19,20 +19,20 @@ def crane(weight: dict[str, float], damping: float = 0.0) -> mstmm.Model:
     """A hub with a rotor in its pin, a boom that bends, and a load on a ball; `weight` makes what
     a body weighs that many times larger."""
 
-    def of(name: str) -> float:
+    def weight_of(name: str) -> float:
         return weight.get(name, 1.0)
 
     def body(name: str, mass: float, inertia: float, **more: Any) -> dict[str, Any]:
-        return {"name": name, "mass": mass * of(name),
-                "inertia": [x * inertia * of(name) for x in (1, 2, 3)], **more}  # fmt: skip
+        return {"name": name, "mass": mass * weight_of(name),
+                "inertia": [x * inertia * weight_of(name) for x in (1, 2, 3)], **more}  # fmt: skip
 
-    law = {"stiffness": 50.0, "damping": damping, "inertia": 0.2 * of("hub")}
+    law = {"stiffness": 50.0, "damping": damping, "inertia": 0.2 * weight_of("hub")}
     return mstmm.compile(
         mstmm.Scene(
             gravity=(0, 0, 0),
             body=[body("hub", 3.0, 0.1, ends={"arm": [0.2, 0, 0]}),
                   body("load", 0.5, 0.01, center_of_mass=[0, -0.4, 0])],
-            beam=[{"name": "boom", **UNIT, "mass_per_length": of("boom"),
+            beam=[{"name": "boom", **UNIT, "mass_per_length": weight_of("boom"),
                    "bending_stiffness": 400.0, "damping": damping, "modes": {"y": 3, "z": 2}}],
             hinge=[
                 {"name": "slew", "type": "pin", "axis": [0, 0, 1], "inboard": "ground",

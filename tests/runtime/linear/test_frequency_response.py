@@ -14,6 +14,7 @@ from mstmm.runtime.engine.tangent_matrix import TangentMatrix
 from mstmm.runtime.linear.linear_model import Linear
 from tests.reference import random_scenes
 from tests.reference.jets import Array
+from tests.support.models import looped_model
 from tests.support.paths import EXAMPLES
 from tests.support.scenes import random_flexible as engine_scenes
 from tests.support.work import calls
@@ -23,13 +24,9 @@ OMEGA = np.array([0.3, 10.0, 1.0, 2.7, 100.0])
 UNIT = 2.0**-53
 
 
-def compiled(scene: Scene) -> mstmm.Model:
-    return mstmm.compile(mstmm.Scene(schema_version=1, **scene), engine="looped")
-
-
-def at(scene: Scene, q: Array, t: float = 0.3) -> Linear:
+def linear_model_at(scene: Scene, q: Array, t: float = 0.3) -> Linear:
     """The linear model near q, at rest there."""
-    model = mstmm.compile(mstmm.Scene(**scene), engine="looped")
+    model = looped_model(scene)
     return model.linearize(q, np.zeros(model.nu), t)
 
 
@@ -48,7 +45,7 @@ def check_dense(linear: Linear) -> None:
 @pytest.mark.parametrize("seed", [0, 1, 3, 4, 5, 7, 8, 9])
 def test_trees_with_springs_between_bodies(seed: int) -> None:
     scene = random_scenes.random_scene(seed)
-    check_dense(at(scene, random_scenes.random_state(scene, seed)[0]))
+    check_dense(linear_model_at(scene, random_scenes.random_state(scene, seed)[0]))
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -57,7 +54,7 @@ def test_flexible_bodies(seed: int) -> None:
     for hinge in scene["hinge"]:
         if "drive" in hinge:
             hinge["drive"] = [x if x == "free" else "0.4" for x in hinge["drive"]]
-    check_dense(at(scene, q))
+    check_dense(linear_model_at(scene, q))
 
 
 @pytest.mark.parametrize("name", ["satellite_panels", "elastic_link", "three_pin_arm_springs"])
@@ -80,17 +77,19 @@ def chain(count: int, damping: float = 0.5) -> Scene:
 
 
 def test_a_chain_of_500() -> None:
-    check_dense(compiled(chain(500)).linearize(np.zeros(500)))
+    check_dense(looped_model(chain(500)).linearize(np.zeros(500)))
 
 
 def test_a_frequency_costs_a_fixed_share_a_body() -> None:
     """No matrix: as many numbers for each of many bodies as of few, and no Python for any."""
     kept, called = [], []
     for count in (50, 2000):
-        linear = compiled(chain(count)).linearize(np.zeros(count), disturbances=())
+        linear = looped_model(chain(count)).linearize(np.zeros(count), disturbances=())
         outputs = [linear.coordinate_names[-1]]
 
-        def asked(points: int, linear: Linear = linear, outputs: list[str] = outputs) -> int:
+        def response_calls(
+            points: int, linear: Linear = linear, outputs: list[str] = outputs
+        ) -> int:
             omega = np.linspace(1, 2, points)
             return calls(
                 lambda: linear.frequency_response(omega, ["rope[0].hinge.effort"], outputs)
@@ -99,7 +98,7 @@ def test_a_frequency_costs_a_fixed_share_a_body() -> None:
         engine = linear.model.looped
         numbers = len(TangentMatrix(engine).numbers) + engine.packed.workspace
         kept.append(numbers / count)
-        called.append(asked(9) - asked(1))
+        called.append(response_calls(9) - response_calls(1))
     assert kept[1] <= kept[0] and called[0] == called[1] == 0
 
 
@@ -133,7 +132,7 @@ def masses(*links: tuple[float, float, float]) -> Scene:
 
 def test_an_oscillator_with_its_rates_and_ends() -> None:
     m, k, d = 2.0, 50.0, 0.3
-    model = compiled(masses((m, k, d)))
+    model = looped_model(masses((m, k, d)))
     outputs = ["s0.displacement", "s0.displacement_rate", "s0.displacement_acceleration",
                "m0.position.x", "m0.vx", "m0.acceleration.x", "m0.y"]  # fmt: skip
     omega = np.array([0.1, 5.0, 4.9999, 700.0])
@@ -157,7 +156,7 @@ def test_ends_go_along_with_coordinates() -> None:
             "ends": {"tip": [2, 0, 0]}}  # fmt: skip
     hinge = {"name": "pin", "type": "pin", "inboard": "ground", "outboard": "rod",
              "axis": [0, 0, 1], "law": {"stiffness": 9.0, "damping": 0.1}}  # fmt: skip
-    model = compiled({"gravity": [0, 0, 0], "body": [body], "hinge": [hinge]})
+    model = looped_model({"gravity": [0, 0, 0], "body": [body], "hinge": [hinge]})
     outputs = ["pin.angle", "rod.tip.x", "rod.tip.vy", "rod.wz", "rod.alphaz"]
     found = model.frequency_response([1.5], ["rod.tip.mz"], outputs, q=[0.4]).response[0, :, 0]
     angle = 1 / (9.0 + 0.15j - 1.5**2 * 2.0)
@@ -168,13 +167,13 @@ def test_ends_go_along_with_coordinates() -> None:
 @pytest.mark.parametrize("omega", [10.0, 10.0 * (1 + 1e-12), 10.0 * (1 - 1e-9)])
 def test_an_absorber_at_its_own_frequency(omega: float) -> None:
     """Held fast, what hangs outboard resonates there; the whole scene does not."""
-    model = compiled(masses((3.0, 70.0, 0.0), (1.0, 100.0, 0.0), (0.5, 20.0, 0.0)))
+    model = looped_model(masses((3.0, 70.0, 0.0), (1.0, 100.0, 0.0), (0.5, 20.0, 0.0)))
     beside = [3.0, omega, 11.0, 4.0, 7.0]
     linear = model.linearize(inputs=["s0.effort"])
     for w, found in zip(beside, linear.frequency_response(beside).response[:, :, 0], strict=True):
         expected = np.linalg.solve(linear.K - w**2 * linear.M, np.eye(3)[0])
         np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-13)
-    two = compiled(masses((3.0, 70.0, 0.0), (1.0, 100.0, 0.0)))
+    two = looped_model(masses((3.0, 70.0, 0.0), (1.0, 100.0, 0.0)))
     first, apart = two.frequency_response([omega], ["s0.effort"]).response[0, :, 0]
     assert abs(first) < 1e-9
     assert abs(first + apart - -0.01) < 1e-9  # x2 = -F / k2
@@ -189,7 +188,7 @@ def test_a_response_that_is_zero_is_an_answer(output: str, turned: float) -> Non
     scene["hinge"] = [hinge | {"axis": along} for hinge in scene["hinge"]]
     scene["output"] = [{"name": "twice", "of": "2*s0.displacement"}]
     omega = float(np.sqrt(50 / 3))
-    linear = compiled(scene).linearize(inputs=["s0.effort"])
+    linear = looped_model(scene).linearize(inputs=["s0.effort"])
     found = linear.frequency_response([omega], outputs=[output]).response[0, 0, 0]
     assert abs(found) < 1e-12  # m, m/s, m/s2 a N
 
@@ -207,27 +206,29 @@ def test_equal_masses_beside_each_other_do_not_move_apart() -> None:
             scene["hinge"].append(hinge | ends | {"name": side + hinge["name"]})
     scene["output"] = [{"name": "apart", "of": "ls0.displacement - rs0.displacement"}]
     omega = float(np.sqrt(50 / 3))
-    found = compiled(scene).frequency_response([omega, 3.0], ["ground.acceleration.x"], ["apart"])
+    found = looped_model(scene).frequency_response(
+        [omega, 3.0], ["ground.acceleration.x"], ["apart"]
+    )
     assert np.abs(found.response).max() < 1e-12
 
 
 @pytest.mark.parametrize("output", ["s0.displacement", "s1.displacement", "m1.ax"])
 def test_a_resonance_is_refused_whatever_is_read(output: str) -> None:
     scene = masses((2.0, 70.0, 0.0), (3.0, 50.0, 0.0))
-    omega = float(compiled(scene).modes().omega[1])
+    omega = float(looped_model(scene).modes().omega[1])
     with pytest.raises(NumericalFailure, match="is an undamped resonance"):
-        compiled(scene).frequency_response([omega], ["s0.effort"], [output])
+        looped_model(scene).frequency_response([omega], ["s0.effort"], [output])
 
 
 def test_a_long_run_under_a_sine() -> None:
     omega, push = 3.0, 1e-4
     scene = chain(3, damping=4.0)
-    linear = compiled(scene).linearize(np.zeros(3), inputs=["rope[1].tip.fx"])
+    linear = looped_model(scene).linearize(np.zeros(3), inputs=["rope[1].tip.fx"])
     outputs = ["rope[2].tip.x", "rope[0].tip.vx"]
     found = linear.frequency_response([omega], outputs=outputs).response[0, :, 0]
     load = {"on": "rope[1].tip", "force": [f"{push}*sin({omega}*t)", 0, 0]}
     times = 200.0 + np.linspace(0, 2 * np.pi / omega, 41)
-    run = compiled({**scene, "load": [load]}).simulate(
+    run = looped_model({**scene, "load": [load]}).simulate(
         times[-1], rtol=1e-10, atol=1e-14, output_times=times
     )
     turns = np.stack([np.sin(omega * times), np.cos(omega * times), np.ones_like(times)], axis=1)
@@ -240,7 +241,7 @@ def test_a_long_run_under_a_sine() -> None:
 
 
 def test_a_resonance_without_damping_is_named() -> None:
-    model = compiled(masses((2.0, 50.0, 0.0)))
+    model = looped_model(masses((2.0, 50.0, 0.0)))
     with pytest.raises(
         NumericalFailure, match=r'omega = 5 rad/s is an undamped resonance.*hinge "s0"'
     ):
@@ -263,13 +264,13 @@ def test_a_resonance_without_damping_is_named() -> None:
     ],
 )  # fmt: skip
 def test_what_makes_no_sense_is_refused(arguments: tuple[Any, ...], expected: str) -> None:
-    model = compiled(masses((2.0, 50.0, 0.1)))
+    model = looped_model(masses((2.0, 50.0, 0.1)))
     with pytest.raises(SceneError, match=expected):
         model.frequency_response(*arguments)
 
 
 def test_speeds_of_ends_are_refused_in_motion() -> None:
-    linear = compiled(masses((2.0, 50.0, 0.1))).linearize([0.1], [1.0])
+    linear = looped_model(masses((2.0, 50.0, 0.1))).linearize([0.1], [1.0])
     linear.frequency_response([1.0], outputs=["s0.displacement_rate", "m0.x"])
     with pytest.raises(SceneError, match=r'"m0\.vx": at a moving state'):
         linear.frequency_response([1.0], outputs=["m0.vx"])

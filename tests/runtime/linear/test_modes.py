@@ -17,14 +17,14 @@ from tests.support.paths import EXAMPLES
 from tests.support.scenes.linear import beads, column, hanging, hanging_beam, masses, pendulum
 
 
-def of(scene: mstmm.Scene) -> mstmm.Model:
+def compile_looped(scene: mstmm.Scene) -> mstmm.Model:
     return mstmm.compile(scene, engine="looped")
 
 
 @pytest.mark.parametrize("count", [5, 50, 500])
 def test_masses_in_a_row(count: int) -> None:
     """2 sqrt(k/m) sin((2 j - 1) pi / (4 N + 2)): all of few, the first ten of many."""
-    modes = of(masses(count, 0.5, 200.0)).modes(min(count, 10))
+    modes = compile_looped(masses(count, 0.5, 200.0)).modes(min(count, 10))
     j = np.arange(1, 1 + min(count, 10))
     expected = 2 * np.sqrt(200 / 0.5) * np.sin((2 * j - 1) * np.pi / (4 * count + 2))
     np.testing.assert_allclose(modes.omega, expected, rtol=1e-8)
@@ -36,7 +36,7 @@ def test_masses_in_a_row(count: int) -> None:
 def test_beads_on_a_string(count: int) -> None:
     """omega^2 l/g are the zeros of Laguerre's polynomial L_N (Euler), the eigenvalues of its
     recurrence: all of few, the first ten of many."""
-    modes = of(beads(count)).modes(min(count, 10))
+    modes = compile_looped(beads(count)).modes(min(count, 10))
     zeros = eigvalsh_tridiagonal(2.0 * np.arange(count) + 1, np.arange(1.0, count))
     expected = np.sqrt(9.81 / 0.2 * zeros[: len(modes)])
     np.testing.assert_allclose(modes.omega, expected, rtol=1e-8)
@@ -44,7 +44,7 @@ def test_beads_on_a_string(count: int) -> None:
 
 
 def test_few_of_many_are_those_of_the_matrices() -> None:
-    linear = of(hanging(450)).linearize()
+    linear = compile_looped(hanging(450)).linearize()
     few, every = linear.modes(12), linear.modes()
     np.testing.assert_allclose(few.omega, every.omega[:12], rtol=1e-9)
     signs = np.sign(np.sum(few.shapes * every.shapes[:, :12], axis=0))
@@ -54,7 +54,7 @@ def test_few_of_many_are_those_of_the_matrices() -> None:
 
 def test_few_vectors_are_enough(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where there is no room for more, the search goes on from what it has."""
-    linear = of(hanging(450)).linearize(disturbances=())
+    linear = compile_looped(hanging(450)).linearize(disturbances=())
     expected = linear.modes(10)
     monkeypatch.setattr(lanczos_iteration, "_VECTORS_PER_MODE", 1)
     monkeypatch.setattr(lanczos_iteration, "_EXTRA_VECTORS", 14)
@@ -71,7 +71,7 @@ def test_few_vectors_are_enough(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_none_is_missed_of_ten_thousand() -> None:
     """The heavy chain of D. Bernoulli: zeros of J0 times sqrt(g/l)/2, from which rods deviate with
     the square of their number in a wave; and the count agrees."""
-    modes = of(hanging(10_000)).modes(20)
+    modes = compile_looped(hanging(10_000)).modes(20)
     np.testing.assert_allclose(modes.omega, jn_zeros(0, 20) / 2 * np.sqrt(9.81), rtol=7e-5)
     assert modes.is_complete
 
@@ -85,13 +85,13 @@ def test_equal_frequencies_are_all_found() -> None:
          "hinge": {"type": "prismatic", "axis": [1, 0, 0], "law": {"stiffness": 100.0}}}
         for name in ("one", "two", "three")
     ]  # fmt: skip
-    modes = of(mstmm.Scene(gravity=(0, 0, 0), chain=chains)).modes(7)
+    modes = compile_looped(mstmm.Scene(gravity=(0, 0, 0), chain=chains)).modes(7)
     j = np.repeat(np.arange(1, 4), 3)[:7]
     np.testing.assert_allclose(modes.omega, 20 * np.sin((2 * j - 1) * np.pi / 602), rtol=1e-8)
     assert modes.is_complete
 
 
-def tied(count: int, stiffness: float) -> mstmm.Scene:
+def sprung_rods(count: int, stiffness: float) -> mstmm.Scene:
     """Rods in space on pins and universal hinges, with springs under tension from one to others."""
     rod = {"mass": 1.0, "center_of_mass": [0.3, 0, 0], "inertia": [0.1, 0.2, 0.3],
            "ends": {"tip": [0.6, 0, 0]}}  # fmt: skip
@@ -112,7 +112,7 @@ def tied(count: int, stiffness: float) -> mstmm.Scene:
 @pytest.mark.parametrize("stiffness", [40.0, 2000.0])
 def test_springs_between_bodies_are_counted(stiffness: float) -> None:
     """Between any two omega^2 of the matrices, and beyond."""
-    linear = of(tied(12, stiffness)).linearize(disturbances=())
+    linear = compile_looped(sprung_rods(12, stiffness)).linearize(disturbances=())
     squares = np.sort(np.linalg.eigvals(np.linalg.solve(linear.M, linear.K)).real)
     edges = [squares[0] - 1, *(squares[1:] + squares[:-1]) / 2, 1.1 * squares[-1]]
     counting = ModeCounter(linear.operators)
@@ -128,7 +128,7 @@ def test_few_of_many_with_springs_between_are_complete() -> None:
         {"name": f"tie{k}", "from": f"row[{a}]", "to": f"row[{b}]",
          "law": {"stiffness": 50.0, "rest": 0.1 * (b - a)}} for k, (a, b) in enumerate(ties)
     ]  # fmt: skip
-    modes = of(mstmm.Scene(**scene)).modes(8)
+    modes = compile_looped(mstmm.Scene(**scene)).modes(8)
     pulls = np.array([np.eye(410)[b] - np.eye(410)[a] for a, b in ties])
     steps = np.eye(410) - np.eye(410, k=-1)
     squares = np.linalg.eigvalsh(200 * steps.T @ steps + 50 * pulls.T @ pulls) / 0.5
@@ -138,9 +138,9 @@ def test_few_of_many_with_springs_between_are_complete() -> None:
 
 def test_loads_that_follow_other_bodies_are_not_counted() -> None:
     """They have no potential, and no count."""
-    scene = tied(6, 40.0).model_dump(by_alias=True, exclude_defaults=True)
+    scene = sprung_rods(6, 40.0).model_dump(by_alias=True, exclude_defaults=True)
     load = {"on": "b2", "force": ["3*h3.q", 0, 0]}
-    linear = of(mstmm.Scene(**(scene | {"load": [load]}))).linearize(disturbances=())
+    linear = compile_looped(mstmm.Scene(**(scene | {"load": [load]}))).linearize(disturbances=())
     assert ModeCounter(linear.operators).count_below(10.0) is None
 
 
@@ -151,7 +151,7 @@ HANGING = {1.0: (3.81917, 18.09284, 52.48919), 0.05: (3.77647, 9.72380, 19.13301
 
 @pytest.mark.parametrize("stiffness", list(HANGING))
 def test_a_beam_that_hangs(stiffness: float) -> None:
-    modes = of(hanging_beam(stiffness)).modes(3)
+    modes = compile_looped(hanging_beam(stiffness)).modes(3)
     np.testing.assert_allclose(modes.omega, HANGING[stiffness], rtol=3e-6)
     assert modes.is_complete
 
@@ -180,14 +180,14 @@ def test_many_bodies_that_float_have_motions_of_frequency_zero() -> None:
         chain=[{"name": "tail", "count": 420, "inboard": "hub", "body": rod, "end": "tip",
                 "hinge": {"type": "pin", "law": {"stiffness": 50.0}}}],
     )  # fmt: skip
-    linear = of(scene).linearize(disturbances=())
+    linear = compile_looped(scene).linearize(disturbances=())
     few, every = linear.modes(9), linear.modes()
     assert few.is_complete and not few.omega[:6].any() and not few.unstable.any()
     np.testing.assert_allclose(few.omega[6:], every.omega[6:9], rtol=1e-6)
 
 
 def test_effective_masses_add_up() -> None:
-    modes = of(hanging(30)).modes()
+    modes = compile_looped(hanging(30)).modes()
     linear = modes.linear
     rigid = linear.W[:, 0] @ np.linalg.solve(linear.M, linear.W[:, 0])
     assert modes.effective_modal_mass[:, 0].sum() == pytest.approx(rigid) and rigid < 1.0
@@ -198,7 +198,7 @@ def test_damping_in_parts_of_the_critical_one(damping: float, ratio: float) -> N
     scene = masses(1, 1.0, 1.0)
     chain = scene.model_dump(by_alias=True)["chain"][0]
     chain["hinge"][0]["law"] = {"stiffness": 1.0, "damping": damping}
-    modes = of(mstmm.Scene(gravity=(0, 0, 0), chain=[chain])).modes()
+    modes = compile_looped(mstmm.Scene(gravity=(0, 0, 0), chain=[chain])).modes()
     expected = np.roots([1, damping, 1])
     kept = expected[expected.imag >= 0]
     np.testing.assert_allclose(np.sort(modes.eigenvalues), np.sort(kept), atol=3e-8)
@@ -206,14 +206,18 @@ def test_damping_in_parts_of_the_critical_one(damping: float, ratio: float) -> N
         assert modes.damping_ratio[0] == pytest.approx(ratio) and modes.omega[0] == pytest.approx(
             1.0
         )
-    assert of(mstmm.Scene(gravity=(0, 0, 0), chain=[chain])).modes(damped=False).is_undamped
+    assert (
+        compile_looped(mstmm.Scene(gravity=(0, 0, 0), chain=[chain]))
+        .modes(damped=False)
+        .is_undamped
+    )
 
 
 def test_damped_motions_of_many() -> None:
     """Stiffness and damping of one kind: s^2 + d s + 1 times each omega^2."""
     chain = masses(500, 0.5, 200.0).model_dump(by_alias=True)["chain"][0]
     chain["hinge"][0]["law"] = {"stiffness": 200.0, "damping": 0.02}
-    modes = of(mstmm.Scene(gravity=(0, 0, 0), chain=[chain])).modes(6)
+    modes = compile_looped(mstmm.Scene(gravity=(0, 0, 0), chain=[chain])).modes(6)
     omega = 40 * np.sin((2 * np.arange(1, 7) - 1) * np.pi / 2002)
     np.testing.assert_allclose(modes.omega, omega, rtol=1e-8)
     np.testing.assert_allclose(modes.damping_ratio, omega * 0.02 / 200 / 2, rtol=1e-6)
@@ -221,7 +225,7 @@ def test_damped_motions_of_many() -> None:
 
 
 def test_shapes_are_states() -> None:
-    model = of(hanging(3))
+    model = compile_looped(hanging(3))
     modes = model.modes()
     moved = modes.displaced_state(0, 0.1)
     np.testing.assert_allclose(moved, 0.1 * modes.shapes[:, 0])
@@ -230,26 +234,26 @@ def test_shapes_are_states() -> None:
 
 
 def test_a_pendulum_that_stands_is_unstable_and_linear_all_the_same() -> None:
-    linear = of(pendulum()).linearize([np.pi])
+    linear = compile_looped(pendulum()).linearize([np.pi])
     (text,) = linear.warnings
     assert "unstable: a motion of pivot.angle grows at a rate of 4.302 1/s" in text
     assert linear.modes().unstable.all() and linear.modes().eigenvalues[0] > 0
 
 
 def test_states_that_do_not_last_are_told() -> None:
-    model = of(pendulum())
+    model = compile_looped(pendulum())
     assert "is not steady: pivot.angle" in model.linearize([0.3]).warnings[0]
     assert not model.linearize().warnings
-    turning = of(hanging(2)).linearize([0, 0], [1.0, 0.0])
+    turning = compile_looped(hanging(2)).linearize([0, 0], [1.0, 0.0])
     assert turning.warnings
     timed = pendulum(law={"effort": "sin(t)"})
-    texts = of(timed).linearize([0.0]).warnings
+    texts = compile_looped(timed).linearize([0.0]).warnings
     assert "is not steady: as loads or drives change with time" in texts[0]
     assert "depend on time" in texts[1]
 
 
 def test_what_makes_no_sense() -> None:
-    model = of(pendulum())
+    model = compile_looped(pendulum())
     linear = model.linearize()
     for count in (0, 2, True):
         with pytest.raises(SceneError, match="expected a number of modes from 1 to 1"):
@@ -277,9 +281,9 @@ def test_what_makes_no_sense() -> None:
     with pytest.raises(SceneError, match="q has shape"):
         model.linearize([0.0, 1.0])
     with pytest.raises(NumericalFailure, match="no equilibrium"):
-        of(pendulum(law={"effort": 100.0})).linearize()
+        compile_looped(pendulum(law={"effort": 100.0})).linearize()
     with pytest.raises(NumericalFailure, match="no equilibrium"):
-        of(pendulum(law={"effort": 100.0})).modes()
+        compile_looped(pendulum(law={"effort": 100.0})).modes()
 
 
 def test_scenes_in_which_nothing_moves_or_rests(recwarn: pytest.WarningsRecorder) -> None:
@@ -287,7 +291,7 @@ def test_scenes_in_which_nothing_moves_or_rests(recwarn: pytest.WarningsRecorder
     hinge = {"name": "on", "inboard": "ground", "outboard": "block"}
 
     def scene(**more: object) -> mstmm.Model:
-        return of(mstmm.Scene(gravity=(0, 0, -9.81), body=[body], hinge=[hinge | more]))
+        return compile_looped(mstmm.Scene(gravity=(0, 0, -9.81), body=[body], hinge=[hinge | more]))
 
     for still in (scene(type="fixed"), scene(type="pin", drive="sin(t)")):
         assert len(still.modes()) == 0 and not still.linearize().warnings
@@ -319,7 +323,7 @@ def test_the_names_of_a_ball() -> None:
 def test_a_buckled_column_is_found_where_its_frequency_vanishes() -> None:
     squares = [
         float(np.min(np.linalg.eigvals(np.linalg.solve(x.M, x.K)).real))
-        for x in (of(column(load, "inertial", 6)).linearize() for load in (2.0, 2.4))
+        for x in (compile_looped(column(load, "inertial", 6)).linearize() for load in (2.0, 2.4))
     ]
     load = 2.0 + 0.4 * squares[0] / (squares[0] - squares[1])
     assert load == pytest.approx(np.pi**2 / 4, rel=1e-3)

@@ -31,7 +31,7 @@ def shaft(across: tuple[float, float]) -> mstmm.Model:
     return mstmm.compile(scene, engine="looped")
 
 
-def closed(spin: float, a: float, b: float) -> np.ndarray:
+def closed_form_roots(spin: float, a: float, b: float) -> np.ndarray:
     """s^4 + (a^2 + b^2 + 2 W^2) s^2 + (a^2 - W^2)(b^2 - W^2) = 0."""
     squares = np.roots([1, a**2 + b**2 + 2 * spin**2, (a**2 - spin**2) * (b**2 - spin**2)])
     return np.sqrt(squares.astype(complex))
@@ -51,7 +51,7 @@ def test_a_shaft_that_is_not_round(spin: float) -> None:
     about_y, about_z = 1.44, 0.81
     modes = shaft((about_y, about_z)).with_parameters({"constants.spin": spin}).modes()
     expected = np.concatenate(
-        [closed(spin, f * np.sqrt(about_z), f * np.sqrt(about_y)) for f in FREE]
+        [closed_form_roots(spin, f * np.sqrt(about_z), f * np.sqrt(about_y)) for f in FREE]
     )
     for one in expected:
         assert np.abs(np.abs(modes.eigenvalues) - np.abs(one)).min() < 1e-6 * abs(one)

@@ -43,7 +43,7 @@ def squares(held: bool, count: int) -> np.ndarray:
     carried = np.array([momentum(way) for way in free]).reshape(free.shape)
     inertia = free @ carried.T
 
-    def moved(bends: np.ndarray) -> np.ndarray:
+    def inertial_bends(bends: np.ndarray) -> np.ndarray:
         turns = np.cumsum(bends if held else np.append(0, bends))
         y = np.append(0, LENGTH * np.cumsum(turns))
         pushed = momentum(y - free.T @ np.linalg.solve(inertia, carried @ y))
@@ -51,7 +51,7 @@ def squares(held: bool, count: int) -> np.ndarray:
         return (efforts if held else efforts[1:]) / SPRING
 
     n = COUNT if held else COUNT - 1
-    operator = LinearOperator((n, n), matvec=moved, dtype=np.float64)
+    operator = LinearOperator((n, n), matvec=inertial_bends, dtype=np.float64)
     return np.sort(1 / eigsh(operator, count, v0=np.ones(n))[0])
 
 

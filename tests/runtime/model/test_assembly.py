@@ -86,7 +86,7 @@ def foot(scene: dict[str, Any], name: str) -> Array:
     return np.array(next(h for h in scene["hinge"] if h["name"] == name)["position"], float)
 
 
-def apart(run: Result, one: str, other: str) -> float:
+def start_distance(run: Result, one: str, other: str) -> float:
     """Distance between two ends at the start, m."""
     return float(np.linalg.norm(run.position(one)[0] - run.position(other)[0]))
 
@@ -111,8 +111,8 @@ def test_the_least_gap_is_that_of_the_geometry(cut: str, mass: float) -> None:
     assert error.pose["foot"] == (2.6,)
     drawn = nearest_pose_result(mstmm.Scene(**scene), error)
     gaps = {
-        "knee": apart(drawn, "crank.tip", "coupler"),
-        "tip": apart(drawn, "coupler.tip", "rocker.tip"),
+        "knee": start_distance(drawn, "crank.tip", "coupler"),
+        "tip": start_distance(drawn, "coupler.tip", "rocker.tip"),
         "end": float(np.linalg.norm(drawn.position("rocker")[0] - foot(scene, "end"))),
     }
     assert abs(gaps.pop(cut) - least) < 1e-6 and max(gaps.values()) < 1e-12

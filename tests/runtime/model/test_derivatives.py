@@ -43,7 +43,7 @@ def tangent_of_q(model: mstmm.Model, q: Array, increment: Array) -> Array:
     return engine.accelerations(TIME, q[None].copy(), increment[None].copy(), memory)[0][0]
 
 
-def directed(model: mstmm.Model, q: Array, draw: Array) -> dict[str, Array]:
+def input_directions(model: mstmm.Model, q: Array, draw: Array) -> dict[str, Array]:
     return {"q": tangent_of_q(model, q, draw), "u": draw, "efforts": draw, "t": np.ones(1)}
 
 
@@ -75,7 +75,7 @@ def test_fifty_digits(seed: int) -> None:
     kernel, inputs = equations(model, q, u)
     draw = np.random.default_rng(seed).normal(size=model.nu)
     found = along(model.derivatives(q, u, TIME), draw)
-    for port, direction in directed(model, q, draw).items():
+    for port, direction in input_directions(model, q, draw).items():
         wanted = fifty_digits(kernel, inputs, port, direction)
         assert worst(found[port], wanted, floor=1e-3) < 1e-10, port
 
@@ -87,7 +87,7 @@ def test_complex_step_on_trees_drawn_afresh(draw: int, rng: np.random.Generator)
     kernel, inputs = equations(model, q, u)
     increment = rng.normal(size=model.nu)
     found = along(model.derivatives(q, u, TIME), increment)
-    for port, direction in directed(model, q, increment).items():
+    for port, direction in input_directions(model, q, increment).items():
         wanted = complex_step(kernel, inputs, {port: direction})["udot"]
         assert worst(found[port], wanted, floor=1.0) < 1e-10, port
 
@@ -100,7 +100,7 @@ def test_complex_step_by_hinge_type(kind: str) -> None:
     kernel, inputs = equations(model, q, u)
     found = model.derivatives(q, u, TIME)
     for k, unit in enumerate(np.eye(model.nu)):
-        for port, direction in directed(model, q, unit).items():
+        for port, direction in input_directions(model, q, unit).items():
             wanted = complex_step(kernel, inputs, {port: direction})["udot"]
             column = found.t if port == "t" else getattr(found, port)[:, k]
             assert worst(column, wanted, floor=1.0) < 1e-11, (port, k)

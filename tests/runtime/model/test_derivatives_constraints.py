@@ -92,7 +92,7 @@ def test_lengths_are_numbers_of_the_scene() -> None:
     assert q[places["slide"].q] == pytest.approx(-below, abs=1e-9)
 
 
-def gimballed() -> mstmm.Model:
+def gimballed_disc() -> mstmm.Model:
     """The disc on hinges whose coordinates do not turn as it rolls: x, y, z, yaw, lean, spin."""
     moment = MASS * RADIUS**2 / 4
     inertia = [moment, 2 * moment, moment]
@@ -115,7 +115,7 @@ def gimballed() -> mstmm.Model:
 def test_how_fast_a_disc_stays_upright(share: float) -> None:
     """Lean and yaw rate obey (I + m r^2) lean'' = m g r lean - (J + m r^2) spin yaw' and
     I yaw'' = J spin lean' with J = 2 I = m r^2 / 2: it stays upright where v^2 > g r / 3."""
-    model, speed = gimballed(), math.sqrt(share * GRAVITY * RADIUS / 3)
+    model, speed = gimballed_disc(), math.sqrt(share * GRAVITY * RADIUS / 3)
     q, spin = model.initial_state()[0], speed / RADIUS
     u = np.array([speed, 0, 0, 0, 0, spin])
     matrix = model.derivatives(q, u).state_matrix

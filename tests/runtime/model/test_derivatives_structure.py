@@ -160,8 +160,8 @@ def test_a_release_is_refused() -> None:
         model.derivatives([0.0], [0.0])
 
 
-def carried(scene: dict[str, Any]) -> tuple[list[int], list[int]]:
-    """Parents of the bodies, and where the tangent carries their S while they wait."""
+def parents_and_places(scene: dict[str, Any]) -> tuple[list[int], list[int]]:
+    """Parents of the bodies, and the places in which the tangent keeps their S."""
     model = compile_scene(scene)
     TangentMatrix(model.looped)
     packed = model.looped.packed
@@ -175,14 +175,14 @@ def test_long_chains_carry_in_a_few_places() -> None:
            "ends": {"tip": [1, 0, 0]}}  # fmt: skip
     chain = {"name": "rope", "count": 500, "inboard": "ground", "body": rod,
              "hinge": {"type": "pin"}}  # fmt: skip
-    _, places = carried({"gravity": [0, -9.81, 0], "chain": [chain]})
+    _, places = parents_and_places({"gravity": [0, -9.81, 0], "chain": [chain]})
     assert len(set(places)) < 20
 
 
 @pytest.mark.parametrize("seed", range(6))
 def test_nobody_waits_where_another_does(seed: int) -> None:
     """A place is taken again by bodies that are begun once its body is eliminated."""
-    parents, places = carried(drawn(700 + seed, most=90)[0])
+    parents, places = parents_and_places(drawn(700 + seed, most=90)[0])
     children: dict[int, list[int]] = {}
     for body, parent in enumerate(parents):
         children.setdefault(parent, []).append(body)

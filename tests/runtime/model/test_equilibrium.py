@@ -86,7 +86,7 @@ def angles_of(found: Array, model: mstmm.Model) -> Array:
     return np.cumsum(turns)
 
 
-def apart(one: Array, other: Array) -> float:
+def angle_difference(one: Array, other: Array) -> float:
     return float(np.abs(np.exp(1j * one) - np.exp(1j * other)).max())
 
 
@@ -107,7 +107,7 @@ def test_a_chain_hangs_as_a_catenary_of_links(name: str, closing: str) -> None:
     start = STARTS[name]
     model = mstmm.compile(mstmm.Scene(**chain(start, closing)), engine="looped")
     found = model.equilibrium()
-    assert apart(angles_of(found, model), catenary(start)) < 1e-8
+    assert angle_difference(angles_of(found, model), catenary(start)) < 1e-8
     assert found.unstable_speeds == () and found.trusted
     assert max(map(abs, found.residuals.values())) < 1e-7
 
@@ -121,7 +121,7 @@ def test_a_straight_chain_is_closed_and_hangs(count: int) -> None:
         one["position"] = [span, 0.0, 0.0]
     model = mstmm.compile(mstmm.Scene(**scene), engine="looped")
     found = model.equilibrium()
-    assert apart(angles_of(found, model), catenary(arc(count, 0.625))) < 1e-8
+    assert angle_difference(angles_of(found, model), catenary(arc(count, 0.625))) < 1e-8
 
 
 def test_a_thousand_links_hang_after_few_steps() -> None:
@@ -130,7 +130,7 @@ def test_a_thousand_links_hang_after_few_steps() -> None:
     model = mstmm.compile(mstmm.Scene(**chain(start)), engine="looped")
     steps = list[float]()
     found = model.equilibrium(progress=lambda _, length: steps.append(length))
-    assert apart(angles_of(found, model), catenary(start)) < 1e-8
+    assert angle_difference(angles_of(found, model), catenary(start)) < 1e-8
     assert found.unstable_speeds == () and len(steps) < 60
 
 
@@ -149,11 +149,11 @@ def test_the_search_is_limited_told_of_and_broken_off() -> None:
         model.equilibrium(max_steps=3, progress=lambda number, _: told.append(number))
     assert told == [0, 1, 2]
 
-    def interrupted(number: int, length: float) -> None:
+    def raise_interrupt(number: int, length: float) -> None:
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        model.equilibrium(progress=interrupted)
+        model.equilibrium(progress=raise_interrupt)
     with pytest.raises(mstmm.SceneError, match="max_steps = 0"):
         model.equilibrium(max_steps=0)
 
@@ -208,7 +208,7 @@ def test_a_chain_folded_between_supports_in_one_place_is_stable_where_it_hangs(
         one["position"] = [0.0, 0.0, 0.0]
     model = mstmm.compile(mstmm.Scene(**scene), engine="looped")
     found = model.equilibrium(np.diff(start, prepend=0.0))
-    assert apart(angles_of(found, model), start) < 1e-6
+    assert angle_difference(angles_of(found, model), start) < 1e-6
     assert (found.unstable_speeds == ()) is held
     weights, draw = count - np.arange(count) - 0.5, np.random.default_rng(1)
     higher = list[bool]()

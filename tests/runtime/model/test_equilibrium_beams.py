@@ -15,7 +15,7 @@ import mstmm
 Array = NDArray[np.float64]
 
 
-def welded(parts: int, force: float, axes: str = "inertial", **beam: Any) -> mstmm.Model:
+def welded_beam_model(parts: int, force: float, axes: str = "inertial", **beam: Any) -> mstmm.Model:
     """A clamped beam of length 1, mass 1 and EI 1 in welded parts, a force across at its end."""
     table = {
         "length": 1 / parts, "mass_per_length": 1.0, "bending_stiffness": 1.0, "modes": {"y": 3},
@@ -54,7 +54,7 @@ def elastica(force: float) -> Array:
     return shot(brentq(lambda angle: shot(angle)[0] - np.pi / 2, small, 2 * small))[2:]
 
 
-def followed(force: float) -> Array:
+def follower_force_tip(force: float) -> Array:
     """Tip of the same beam under a force that stays across its end: from there, phi = theta_tip -
     theta has phi'' = P cos phi without a condition at the other end."""
     end = solve_ivp(
@@ -68,25 +68,25 @@ def followed(force: float) -> Array:
 
 @pytest.mark.parametrize("force", [2.0, 10.0])
 def test_far_bending_is_the_elastica(force: float) -> None:
-    model = welded(8, force)
+    model = welded_beam_model(8, force)
     assert np.abs(tip(model, model.equilibrium(), "p7.tip") - elastica(force)).max() < 2e-4
 
 
 def test_far_bending_under_a_force_that_follows_the_end() -> None:
-    model = welded(10, 20.0, "body")
-    assert np.abs(tip(model, model.equilibrium(), "p9.tip") - followed(20.0)).max() < 2e-2
+    model = welded_beam_model(10, 20.0, "body")
+    assert np.abs(tip(model, model.equilibrium(), "p9.tip") - follower_force_tip(20.0)).max() < 2e-2
 
 
 def test_a_stiff_direction_does_not_end_the_search_in_a_soft_one() -> None:
     """Axial shapes are ten million times stiffer than bending."""
-    model = welded(4, 2.0, axial_stiffness=1e7, modes={"y": 3, "axial": 2})
+    model = welded_beam_model(4, 2.0, axial_stiffness=1e7, modes={"y": 3, "axial": 2})
     q = model.equilibrium()
     assert np.abs(model.accelerations(q, np.zeros(model.nu))).max() < 1e-6
     assert np.abs(tip(model, q, "p3.tip") - elastica(2.0)).max() < 2e-3
 
 
 def test_a_soft_twist_beside_stiff_tension_is_determined() -> None:
-    model = welded(
+    model = welded_beam_model(
         1, 0.1, modes={"y": 2, "twist": 2, "axial": 2}, frame="tangent", axial_stiffness=1e10,
         torsional_stiffness=1.0, polar_inertia_per_length=0.01,
     )  # fmt: skip
@@ -96,19 +96,19 @@ def test_a_soft_twist_beside_stiff_tension_is_determined() -> None:
 
 def test_a_first_step_out_of_the_model_is_made_shorter() -> None:
     """Linear bending would turn the end by 20 rad."""
-    model = welded(10, 30.0)
+    model = welded_beam_model(10, 30.0)
     assert np.abs(tip(model, model.equilibrium(), "p9.tip") - elastica(30.0)).max() < 1e-3
 
 
 def test_a_static_start_is_found_where_the_equilibrium_is() -> None:
-    model = welded(10, 10.0, initial="static")
+    model = welded_beam_model(10, 10.0, initial="static")
     q, _ = model.initial_state()
     assert np.abs(q - model.equilibrium(np.zeros(model.nq))).max() < 1e-9
     assert np.abs(tip(model, q, "p9.tip") - elastica(10.0)).max() < 1e-4
 
 
 def test_residuals_have_the_names_of_the_coordinates() -> None:
-    model = welded(4, 2.0)
+    model = welded_beam_model(4, 2.0)
     found = model.equilibrium()
     assert list(found.residuals) == model.coordinate_layout.u_names
     still = np.zeros(model.nu)

@@ -52,7 +52,7 @@ def test_a_tree_whose_drives_leave_nothing_free_is_where_they_have_it() -> None:
     assert np.abs(found - 0.3).max() < 1e-12 and found.residuals == {}
 
 
-def carried(offset: float, inertia: list[float], drive: str = "20*t") -> mstmm.Model:
+def driven_disc_model(offset: float, inertia: list[float], drive: str = "20*t") -> mstmm.Model:
     """A disc of 2 kg that a drive turns on a sprung slide of 1 kg, its mass centre so far out."""
     disc = {"name": "disc", "mass": 2.0, "center_of_mass": [offset, 0, 0], "inertia": inertia}
     slide = {"name": "x", "type": "prismatic", "inboard": "ground", "outboard": "slide",
@@ -66,7 +66,7 @@ def carried(offset: float, inertia: list[float], drive: str = "20*t") -> mstmm.M
 @pytest.mark.parametrize("inertia", [[1.0, 1.0, 1.0], [0.0, 0.0, 0.0]])
 def test_an_offset_of_rounding_is_no_length_and_no_unbalance(inertia: list[float]) -> None:
     for offset in (1e-12, 1e-9, 1e-7):
-        found = carried(offset, inertia).equilibrium()
+        found = driven_disc_model(offset, inertia).equilibrium()
         assert abs(found[0] + 3 * GRAVITY / 1000) < 1e-12
         assert found.unstable_speeds == () and found.trusted
 
@@ -75,13 +75,13 @@ def test_an_offset_of_rounding_is_no_length_and_no_unbalance(inertia: list[float
 def test_an_unbalance_that_shakes_does_not_last(inertia: float) -> None:
     for offset in (1e-4, 1e-3, 1e-2):
         with pytest.raises(NumericalFailure, match="is not steady: as drives move"):
-            carried(offset, 3 * [inertia]).equilibrium()
+            driven_disc_model(offset, 3 * [inertia]).equilibrium()
 
 
 @pytest.mark.parametrize("offset", [2e-6, 5e-6])
 def test_an_unbalance_far_below_the_weight_changes_the_rest_slightly(offset: float) -> None:
     """m r omega^2 of 5e-5 and 1e-4 of the weight, far from resonance."""
-    found = carried(offset, 3 * [1.0]).equilibrium()
+    found = driven_disc_model(offset, 3 * [1.0]).equilibrium()
     assert abs(found[0] + 3 * GRAVITY / 1000) < 1e-6
     assert [risk.name for risk in found.risks] == ["unsteady-state"]
     assert "changes slowly" in found.warnings[0]
@@ -90,4 +90,4 @@ def test_an_unbalance_far_below_the_weight_changes_the_rest_slightly(offset: flo
 
 def test_a_small_unbalance_at_resonance_is_no_small_change() -> None:
     with pytest.raises(NumericalFailure, match="is not steady"):
-        carried(5e-6, 3 * [1.0], drive=f"{np.sqrt(1000 / 3):.15g}*t").equilibrium()
+        driven_disc_model(5e-6, 3 * [1.0], drive=f"{np.sqrt(1000 / 3):.15g}*t").equilibrium()

@@ -253,11 +253,11 @@ def test_methods_of_whole_runs_are_refused(method: str) -> None:
 def test_a_step_is_checked_once_per_model(monkeypatch: pytest.MonkeyPatch) -> None:
     calls = []
 
-    def counted(*given: Any) -> Any:
+    def record_check(*given: Any) -> Any:
         calls.append(given)
         return check_step(*given)
 
-    monkeypatch.setattr(session, "check_step", counted)
+    monkeypatch.setattr(session, "check_step", record_check)
     spring = {"name": "pin", "type": "pin", "inboard": "ground", "outboard": "rod1",
               "law": {"stiffness": 4e4}}  # fmt: skip
     model = mstmm.compile(mstmm.Scene(gravity=(0, 0, 0), body=[body("rod1")], hinge=[spring]))

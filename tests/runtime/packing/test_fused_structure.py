@@ -92,17 +92,17 @@ def test_other_numbers_need_no_compiler_and_structural_zeros_do(monkeypatch: Any
 
 
 def test_numbers_of_expressions_are_no_structure() -> None:
-    def loaded(force: str) -> mstmm.Scene:
+    def loaded_chain(force: str) -> mstmm.Scene:
         load = {"on": "b1.tip", "force": ["0", force, "0"]}
         return chain(2, PLANAR, FULL, [0, -9.81, 0], load=[load])
 
     q, u = np.array([0.3, -0.4]), np.array([0.5, 0.2])
     found = []
     for force in ("10*cos(3*t)", "4*cos(5*t)"):
-        looped = mstmm.compile(loaded(force), engine="looped")
+        looped = mstmm.compile(loaded_chain(force), engine="looped")
         structure, _ = structure_of(looped.packed_scene.system, {})
         found.append(structure.identity())
-        fused = mstmm.compile(loaded(force), engine="fused")
+        fused = mstmm.compile(loaded_chain(force), engine="fused")
         np.testing.assert_allclose(
             fused.accelerations(q, u, 0.7), looped.accelerations(q, u, 0.7), rtol=1e-13
         )
@@ -126,7 +126,7 @@ def test_auto_compiles_only_what_pays() -> None:
     assert "cache" in again.engine_reason
 
 
-def released() -> mstmm.Scene:
+def released_scene() -> mstmm.Scene:
     hinge = {**PLANAR, "drive": ["0"], "release": "t >= 1"}
     return chain(1, hinge, FULL, [0, -9.81, 0])
 
@@ -135,7 +135,10 @@ def long() -> mstmm.Scene:
     return chain(MAX_BODIES + 1, PLANAR, FULL, [0, -9.81, 0])
 
 
-@pytest.mark.parametrize(("scene", "reason"), [(released, "released"), (long, "bodies")])
+@pytest.mark.parametrize(
+    ("scene", "reason"),
+    [pytest.param(released_scene, "released", id="released-released"), (long, "bodies")],
+)
 def test_what_cannot_be_fused_says_why(scene: Any, reason: str) -> None:
     model = mstmm.compile(scene())
     assert model.fusion.ready(1e12) is None

@@ -60,7 +60,7 @@ def test_numbers_of_the_kernel_to_rounding(seed: int) -> None:
     for name in names[:25]:
         _, p, moved = parameter_derivatives(scene, {}, [name])
 
-        def shifted(change: float, name: str = name, size: int = len(p)) -> Array:
+        def shifted_numbers(change: float, name: str = name, size: int = len(p)) -> Array:
             try:
                 found = numbers(
                     scene_parameters.with_parameters(scene, {name: values[name] + change})
@@ -73,10 +73,10 @@ def test_numbers_of_the_kernel_to_rounding(seed: int) -> None:
 
         step = 0.005 * min(1.0, abs(values[name]))
         try:
-            wanted = eighth_order(shifted, step)
+            wanted = eighth_order(shifted_numbers, step)
         except OtherStructure:
             continue
-        assert np.array_equal(p, shifted(0.0)), name
+        assert np.array_equal(p, shifted_numbers(0.0)), name
         size = max(1.0, float(np.abs(p[np.abs(wanted) > 0]).max(initial=0)))
         assert np.abs(moved[:, 0] - wanted).max() < 1e-14 * size / step + 1e-12 * size, name
         checked += 1
@@ -300,9 +300,9 @@ def test_rotations_of_duals(function: Any) -> None:
         moving = [Dual(x, {0: 1.0}) if i == k else x for i, x in enumerate(v)]
         found = [x for row in function(moving) for x in row]
 
-        def shifted(change: float, k: int = k) -> Array:
+        def shifted_values(change: float, k: int = k) -> Array:
             return np.array(function([x + change * (i == k) for i, x in enumerate(v)])).ravel()
 
-        assert [getattr(x, "value", x) for x in found] == list(shifted(0.0))
+        assert [getattr(x, "value", x) for x in found] == list(shifted_values(0.0))
         slope = [x.slope.get(0, 0.0) if isinstance(x, Dual) else 0.0 for x in found]
-        assert np.abs(np.array(slope) - eighth_order(shifted, 0.01)).max() < 1e-11
+        assert np.abs(np.array(slope) - eighth_order(shifted_values, 0.01)).max() < 1e-11

@@ -153,7 +153,7 @@ def test_pairs_without_a_matrix_are_named(kinds: tuple[str, ...], named: str) ->
         compile_scene(chain(kinds), sweep="product")
 
 
-def _branched(scene: dict[str, Any]) -> None:
+def _branch_chain(scene: dict[str, Any]) -> None:
     scene["hinge"][2]["inboard"] = "rod0.tip"
 
 
@@ -176,7 +176,7 @@ def _massless(scene: dict[str, Any]) -> None:
 @pytest.mark.parametrize(
     ("change", "named"),
     [
-        (_branched, "unbranched chain"),
+        pytest.param(_branch_chain, "unbranched chain", id="_branched-unbranched chain"),
         (_two_roots, "unbranched chain"),
         (_driven, 'hinge "hinge1".*drives'),
         (_rotor, 'hinge "hinge1".*rotor'),

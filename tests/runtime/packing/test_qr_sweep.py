@@ -23,7 +23,7 @@ TIME = 0.3
 COUNT = 8
 
 
-def compiled(scene: dict[str, Any], **options: Any) -> mstmm.Model:
+def qr_model(scene: dict[str, Any], **options: Any) -> mstmm.Model:
     return mstmm.compile(mstmm.Scene(**scene), sweep="qr", **options)
 
 
@@ -36,7 +36,7 @@ def riccati(scene: dict[str, Any]) -> mstmm.Model:
 
 def compare(scene: dict[str, Any], q: Array, u: Array) -> None:
     """Accelerations with the dense equations, loads, efforts and power with the other sweep."""
-    model, expected = compiled(scene), dense.solve(scene, q, u, TIME).udot
+    model, expected = qr_model(scene), dense.solve(scene, q, u, TIME).udot
     assert worst(model.accelerations(q, u, t=TIME), expected) < ACCURACY
     here: dict[str, Any] = {"t_start": TIME, "t_end": TIME, "initial": (q, u)}
     found, other = model.simulate(**here), riccati(scene).simulate(**here)
@@ -91,7 +91,7 @@ def with_tip(scene: dict[str, Any], ratio: float) -> dict[str, Any]:
 def errors(scene: dict[str, Any], rng: np.random.Generator) -> tuple[float, float]:
     """Of least squares, and of the Riccati sweep: the middle one of five states.  Of least squares
     one state in a hundred errs by more than 1e-13."""
-    models, found = (compiled(scene), riccati(scene)), list[list[float]]()
+    models, found = (qr_model(scene), riccati(scene)), list[list[float]]()
     at = extended_precision_accelerations(models[1])
     for _ in range(5):
         q, u = drawn_state(scene, rng)
@@ -160,7 +160,7 @@ def test_an_undetermined_motion_is_refused(sweep: str) -> None:
 
 def test_a_run_is_that_of_the_other_sweep() -> None:
     scene = chain(["pin"] * 4, 0.6)
-    runs = [m.simulate(2.0, rtol=1e-11, atol=1e-13) for m in (compiled(scene), riccati(scene))]
+    runs = [m.simulate(2.0, rtol=1e-11, atol=1e-13) for m in (qr_model(scene), riccati(scene))]
     assert all(run.success for run in runs)
     assert worst(runs[0].q[-1], runs[1].q[-1]) < 1e-8
 
@@ -170,7 +170,7 @@ def test_a_run_with_a_heavy_tip_needs_no_steps_for_rounding() -> None:
     scene = with_tip(chain(["pin"] * 6, inertia=(0.1, 0.1, 0.1), gravity=(0, 0, 0)), 1e10)
     for hinge, angle in zip(scene["hinge"], (0.5, -1.0, 0.8, 0.5, -0.7, 0.4), strict=True):
         hinge["initial"] = {"q": [angle], "u": [0.1 * (hinge["name"] == "hinge0")]}
-    runs = [model.simulate(0.02, rtol=1e-9) for model in (compiled(scene), riccati(scene))]
+    runs = [model.simulate(0.02, rtol=1e-9) for model in (qr_model(scene), riccati(scene))]
     assert all(run.success for run in runs)
     mine, other = (run.trajectory.statistics for run in runs)
     assert mine is not None and other is not None
@@ -181,7 +181,7 @@ def test_a_run_with_a_heavy_tip_needs_no_steps_for_rounding() -> None:
 def test_other_numbers_and_many_states_at_once(rng: np.random.Generator) -> None:
     scene = with_tip(chain(["pin"] * 4), 1e9)
     changes = {f"rod3.inertia[{k}]": scene["body"][3]["inertia"][k] for k in range(3)}
-    model = compiled(chain(["pin"] * 4)).with_parameters({"rod3.mass": 1e9, **changes})
+    model = qr_model(chain(["pin"] * 4)).with_parameters({"rod3.mass": 1e9, **changes})
     states = [drawn_state(scene, rng) for _ in range(3)]
     q, u = (np.array(part) for part in zip(*states, strict=True))
     exact = extended_precision_accelerations(riccati(scene))
@@ -193,7 +193,7 @@ def test_solutions_of_the_mass_matrix(rng: np.random.Generator) -> None:
     """M^-1 times columns is the acceleration, at rest and without weight, by efforts of laws."""
     still = with_tip(chain(["pin"] * COUNT, 0.6, gravity=(0, 0, 0)), 1e10)
     q, columns = rng.uniform(-1, 1, COUNT), rng.uniform(-1, 1, (COUNT, 3))
-    found, other = (model.solve(q, columns) for model in (compiled(still), riccati(still)))
+    found, other = (model.solve(q, columns) for model in (qr_model(still), riccati(still)))
     gaps = list[tuple[float, float]]()
     for k, column in enumerate(columns.T):
         laws = [{"law": {"effort": repr(float(tau))}} for tau in column]
@@ -210,7 +210,7 @@ def test_solutions_of_the_mass_matrix(rng: np.random.Generator) -> None:
 def test_solutions_on_any_tree(seed: int, rng: np.random.Generator) -> None:
     scene = random_scenes.random_scene(seed)
     q, _ = random_scenes.random_state(scene, seed)
-    models = compiled(scene), riccati(scene)
+    models = qr_model(scene), riccati(scene)
     columns = rng.uniform(-1, 1, (models[0].nu, 2))
     assert worst(models[0].solve(q, columns), models[1].solve(q, columns)) < 1e-11
 
@@ -221,9 +221,9 @@ def test_solutions_on_any_tree(seed: int, rng: np.random.Generator) -> None:
 def test_no_fused_code_and_no_flexible_bodies() -> None:
     scene = chain(["pin"] * 2)
     with pytest.raises(SceneError, match='sweep = "qr" has no fused code'):
-        compiled(scene, engine="fused")
+        qr_model(scene, engine="fused")
     assert (
-        compiled(scene).engine_reason
+        qr_model(scene).engine_reason
         == "looped: the least-squares sweep exists only in the looped engine"
     )
     beam = {"name": "blade", "length": 1.0, "mass_per_length": 1.0, "bending_stiffness": 1.0}
@@ -232,8 +232,8 @@ def test_no_fused_code_and_no_flexible_bodies() -> None:
         "hinge": [{"name": "root", "type": "pin", "inboard": "ground", "outboard": "blade"}],
     }  # fmt: skip
     with pytest.raises(SceneError, match=r'"blade": sweep = "qr" needs rigid bodies'):
-        compiled(bent)
-    assert compiled(bent, flexibility="rigid").nu == 1
+        qr_model(bent)
+    assert qr_model(bent, flexibility="rigid").nu == 1
 
 
 @pytest.mark.parametrize(
@@ -246,7 +246,7 @@ def test_negative_moments_of_inertia_are_refused(inertia: list[float]) -> None:
     with pytest.raises(
         SceneError, match='body "rod1": sweep = "qr" needs a positive semidefinite mass matrix'
     ):
-        compiled(scene)
+        qr_model(scene)
 
 
 def test_moments_that_only_break_the_triangle_are_taken(rng: np.random.Generator) -> None:
@@ -257,12 +257,12 @@ def test_moments_that_only_break_the_triangle_are_taken(rng: np.random.Generator
 @pytest.mark.parametrize("method", ["genalpha", "rodas4p2", "kvaerno5", "dttmm-classical"])
 def test_implicit_and_classical_methods_are_refused(method: str) -> None:
     with pytest.raises(SceneError, match='sweep = "qr" gives accelerations'):
-        compiled(chain(["pin"] * 2)).simulate(0.1, method, step=1e-3)
+        qr_model(chain(["pin"] * 2)).simulate(0.1, method, step=1e-3)
 
 
 def test_second_opinions_integrate_the_same_accelerations() -> None:
     scene = with_tip(chain(["pin"] * 4), 1e6)
-    model = compiled(scene)
+    model = qr_model(scene)
     runs = [model.simulate(1e-3, name, rtol=1e-9) for name in ("dop853", "scipy-Radau")]
     assert all(run.success for run in runs)
     assert worst(runs[0].q[-1], runs[1].q[-1]) < 1e-7
@@ -271,7 +271,7 @@ def test_second_opinions_integrate_the_same_accelerations() -> None:
 def test_automatic_methods_stay_explicit() -> None:
     scene = chain(["pin"] * 2)
     scene["hinge"][1]["law"] = {"stiffness": [1e6], "damping": [1e4]}
-    run = compiled(scene).simulate(0.2, "auto", rtol=1e-6)
+    run = qr_model(scene).simulate(0.2, "auto", rtol=1e-6)
     assert run.success
     assert [stretch.method for stretch in run.trajectory.methods] == ["dop853", "dop853"]
     assert 'sweep = "qr" gives accelerations' in run.trajectory.methods[-1].reason
@@ -281,7 +281,7 @@ def test_automatic_methods_stay_explicit() -> None:
 
 def test_the_risk_of_lost_digits_names_the_way_out_and_is_none_there(tmp_path: Path) -> None:
     scene = with_tip(chain(["pin"] * 4, gravity=(0, 0, 0)), 1e11)
-    runs = [model.simulate(1e-3, rtol=1e-6) for model in (compiled(scene), riccati(scene))]
+    runs = [model.simulate(1e-3, rtol=1e-6) for model in (qr_model(scene), riccati(scene))]
     (risk,) = (risk for risk in runs[1].risks if risk.name == "pivot-loss")
     assert 'sweep = "refined"' in risk.remedy
     assert not [risk for risk in runs[0].risks if risk.name == "pivot-loss"]

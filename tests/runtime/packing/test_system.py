@@ -61,7 +61,7 @@ def arm(mass: float = 2.0) -> mstmm.Scene:
     )  # fmt: skip
 
 
-def made(scene: mstmm.Scene) -> System:
+def scene_system(scene: mstmm.Scene) -> System:
     return system_of(scene)[0]
 
 
@@ -73,19 +73,19 @@ def test_every_record_of_a_system_is_frozen() -> None:
 
 @pytest.mark.parametrize("make", [arm, lambda: mstmm.Scene(**chain(9))])
 def test_equal_scenes_have_equal_systems(make: Any) -> None:
-    assert made(make()) == made(make())
+    assert scene_system(make()) == scene_system(make())
 
 
 def test_another_number_is_another_system() -> None:
-    assert made(arm()) != made(arm(2.5))
+    assert scene_system(arm()) != scene_system(arm(2.5))
     stiffer = mstmm.compile(arm(), engine="looped").with_parameters(
         {"blade.bending_stiffness[0]": 99}
     )
-    assert made(arm()) != stiffer.packed_scene.system
+    assert scene_system(arm()) != stiffer.packed_scene.system
 
 
 def test_a_system_holds_nothing_of_c() -> None:
-    system = made(arm())
+    system = scene_system(arm())
     assert pickle.loads(pickle.dumps(system)) == system
 
 
@@ -99,7 +99,7 @@ def test_a_chain_is_the_bodies_written_out(count: int) -> None:
         plain["hinge"][k] = PATTERN[k % pattern] | {
             key: hinge[key] for key in ("name", "inboard", "outboard")
         }
-    one, other = made(mstmm.Scene(**data)), made(mstmm.Scene(**plain))
+    one, other = scene_system(mstmm.Scene(**data)), scene_system(mstmm.Scene(**plain))
     assert [one.body(k) for k in range(count)] == [other.body(k) for k in range(count)]
     assert (one.parents == other.parents).all()
     structures = [structure_of(system, {}) for system in (one, other)]
@@ -108,7 +108,7 @@ def test_a_chain_is_the_bodies_written_out(count: int) -> None:
 
 
 def test_members_of_a_chain_share_their_numbers() -> None:
-    system = made(mstmm.Scene(**chain(1_000_000) | {"chain": [
+    system = scene_system(mstmm.Scene(**chain(1_000_000) | {"chain": [
         chain(1_000_000)["chain"][0] | {"hinge": PATTERN[1:]}
     ]}))  # fmt: skip
     assert system.count == 1_000_000

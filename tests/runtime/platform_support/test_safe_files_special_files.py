@@ -29,7 +29,7 @@ def pipe(tmp_path: Path) -> Iterator[Path]:
     os.close(reader)
 
 
-def resumed(path: Path) -> Any:
+def resume_run(path: Path) -> Any:
     return mstmm.compile(pins(1, [0.3])).simulate(
         0.1, execution=mstmm.Execution(checkpoint=path, resume=True)
     )
@@ -38,7 +38,7 @@ def resumed(path: Path) -> Any:
 READERS: dict[str, Callable[[Path], Any]] = {
     "matrices": lambda path: load_matrices(path, "here"),
     "mesh": lambda path: read_mesh(path, "here"),
-    "checkpoint": resumed,
+    "checkpoint": resume_run,
     "result": mstmm.load_result,
 }
 

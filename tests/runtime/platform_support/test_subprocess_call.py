@@ -79,20 +79,20 @@ def test_an_interrupt_ends_work_that_holds_the_lock(work: ModuleType, tmp_path: 
 def test_long_bodies_are_made_apart(monkeypatch: pytest.MonkeyPatch) -> None:
     """The numbers are those of this process, and a body that is refused is refused in its words."""
 
-    def made(**changes: Any) -> ModalBody:
+    def build_body(**changes: Any) -> ModalBody:
         modal_elastic._cached_body.cache_clear()
         return modal_elastic.elastic_bodies(bar.scene(bar.table(**changes)))["bar"]
 
-    here, used = made(), []
+    here, used = build_body(), []
 
-    def recorded(what: str, *call: Any) -> Any:
+    def record_call(what: str, *call: Any) -> Any:
         used.append(what)
         return run_in_subprocess(what, *call)
 
     monkeypatch.setattr(modal_elastic, "SUBPROCESS_UNKNOWNS", 0.0)
-    monkeypatch.setattr(modal_elastic, "run_in_subprocess", recorded)
-    there = made()
+    monkeypatch.setattr(modal_elastic, "run_in_subprocess", record_call)
+    there = build_body()
     assert used == ['elastic "bar"'] and there.notes == here.notes
     assert there.C.tobytes() == here.C.tobytes() and there.K.tobytes() == here.K.tobytes()
     with pytest.raises(SceneError, match=r'elastic "bar".*highest_frequency: expected at least'):
-        made(highest_frequency=1e-3)
+        build_body(highest_frequency=1e-3)

@@ -33,8 +33,8 @@ def bodies(*names: str) -> list[Scene]:
              "ends": {"tip": [1.0, 0, 0]}} for k, name in enumerate(names)]  # fmt: skip
 
 
-def asked(scene: Scene, **settings: Any) -> set[str]:
-    """Names, after a run with a blow that has to be trusted."""
+def conserved_momenta(scene: Scene, **settings: Any) -> set[str]:
+    """Names of the momenta that a trusted run with an impact conserves."""
     scene = {"gravity": [0, 0, 0]} | scene
     model = mstmm.compile(mstmm.Scene(**scene), engine="looped")
     run = model.simulate(2.0, certify=True, **settings)
@@ -56,7 +56,7 @@ def test_a_ball_between_floor_and_wall(method: str) -> None:
     scene = {"gravity": [0, -9.81, 0], "body": bodies("a"), "hinge": BALL,
              "event": events("a.y <= 0", "a.x > 1")}  # fmt: skip
     step = 0.002 if method == "rk4" else None
-    assert asked(scene, method=method, step=step) == {"z"}
+    assert conserved_momenta(scene, method=method, step=step) == {"z"}
 
 
 @pytest.mark.parametrize(
@@ -70,7 +70,7 @@ def test_a_ball_between_floor_and_wall(method: str) -> None:
 def test_a_wall_that_moves(when: str, kept: set[str]) -> None:
     """What is pushed against the wall's normal is its own affair, and what turns about that."""
     fast = [free("a", [0, 1.2, 0.1], [1, -1, 0.3, 0.1, 0.2, 0])]
-    assert asked({"body": bodies("a"), "hinge": fast, "event": events(when)}) == kept
+    assert conserved_momenta({"body": bodies("a"), "hinge": fast, "event": events(when)}) == kept
 
 
 @pytest.mark.parametrize(
@@ -85,7 +85,7 @@ def test_a_wall_that_moves(when: str, kept: set[str]) -> None:
 def test_two_balls(when: str, kept: set[str]) -> None:
     """Along a line between them they strike each other alone; planes that no body carries turn with
     none."""
-    found = asked({"body": bodies("a", "b"), "hinge": PAIR, "event": events(when)})
+    found = conserved_momenta({"body": bodies("a", "b"), "hinge": PAIR, "event": events(when)})
     assert found == kept
 
 
@@ -96,7 +96,9 @@ def test_carts_on_a_rail(when: str, kept: set[str]) -> None:
     rails = [hinge("ra", "prismatic", "ground", "a", 1.0, axis=[1, 0, 0]),
              hinge("rb", "prismatic", "ground", "b", 0.1, axis=[1, 0, 0])]  # fmt: skip
     rails[1]["initial"]["q"] = 1.0
-    assert asked({"body": bodies("a", "b"), "hinge": rails, "event": events(when)}) == kept
+    assert (
+        conserved_momenta({"body": bodies("a", "b"), "hinge": rails, "event": events(when)}) == kept
+    )
 
 
 def test_hard_stops_inside_a_scene() -> None:
@@ -105,10 +107,10 @@ def test_hard_stops_inside_a_scene() -> None:
     pin = hinge("knee", "pin", "a", "b", 2.0, law=STOPS)
     flying = [free("a", [0, 0, 0], [1, 0.2, 0.1, 0, 0, 1]), pin]
     every = {"x", "y", "z", "angular x", "angular y", "angular z"}
-    assert asked({"body": bodies("a", "b"), "hinge": flying}) == every
+    assert conserved_momenta({"body": bodies("a", "b"), "hinge": flying}) == every
     rail = hinge("rail", "prismatic", "ground", "a", 1.0, axis=[1, 0, 0])
     across = hinge("across", "prismatic", "a", "b", 1.0, axis=[0, 1, 0], law=STOPS)
-    assert asked({"body": bodies("a", "b"), "hinge": [rail, across]}) == {"x"}
+    assert conserved_momenta({"body": bodies("a", "b"), "hinge": [rail, across]}) == {"x"}
 
 
 def test_a_pendulum() -> None:
@@ -116,10 +118,12 @@ def test_a_pendulum() -> None:
     pins = [hinge("top", "pin", "ground", "a", 1.0), hinge("knee", "pin", "a.tip", "b", 2.0)]
     two = bodies("a", "b")
     stopped = [pins[0], pins[1] | {"law": STOPS}]
-    assert asked({"body": two, "hinge": stopped}) == {"angular z"}
+    assert conserved_momenta({"body": two, "hinge": stopped}) == {"angular z"}
     circle = events("b.tip.x^2 + b.tip.y^2 < 3")
-    assert asked({"body": two, "hinge": pins, "event": circle}) == {"angular z"}
-    assert asked({"body": two, "hinge": pins, "event": events("b.tip.y > 0.9")}) == set()
+    assert conserved_momenta({"body": two, "hinge": pins, "event": circle}) == {"angular z"}
+    assert (
+        conserved_momenta({"body": two, "hinge": pins, "event": events("b.tip.y > 0.9")}) == set()
+    )
 
 
 def test_a_hub_with_a_blade() -> None:
@@ -142,7 +146,7 @@ def test_blows_between_output_times_are_not_forgotten() -> None:
         "gravity": [0, 0, 0], "body": bodies("ball"),
         "hinge": [free("ball", [0, 0, 0], [1, 0.2, 0, 0, 0, 0.5])], "event": events("ball.x > 1"),
     }  # fmt: skip
-    assert "y" in asked(scene)
+    assert "y" in conserved_momenta(scene)
     model = mstmm.compile(mstmm.Scene(**scene), engine="looped")
     run = model.simulate(2.0, output_times=[0.0, 0.5, 2.0], certify=True)
     assert run.trusted and not run.certificate.momentum

@@ -21,7 +21,7 @@ PULSE = "100*exp(-((q - 5)/0.004)^2)"
 SWITCHED = f"where(q > 4.976, where(q < 5.024, {PULSE}, 0), 0)"
 
 
-def told(effort: str, speed: float = 1.0, **settings: Any) -> bool:
+def has_missed_feature(effort: str, speed: float = 1.0, **settings: Any) -> bool:
     run = mstmm.compile(motor(effort, speed=speed), engine="looped").simulate(10.0, **settings)
     found = missed_feature_risks(run.model, run.trajectory)
     assert all(r.name == "narrow-load" and 'hinge "motor"' in r.element for r in found)
@@ -32,25 +32,25 @@ def told(effort: str, speed: float = 1.0, **settings: Any) -> bool:
 @pytest.mark.parametrize("times", [None, [10.0], np.linspace(0, 10, 11)])
 @pytest.mark.parametrize("effort, passed", [(PULSE, True), (SWITCHED, False)])
 def test_a_pulse_that_was_passed_over(effort: str, passed: bool, times: Any) -> None:
-    assert told(effort, output_times=times) == passed
+    assert has_missed_feature(effort, output_times=times) == passed
 
 
 def test_short_steps_see_it() -> None:
-    assert not told(PULSE, method=mstmm.methods.Method(max_step=1e-3))
-    assert not told(PULSE, method="rk4", step=1e-3)
-    assert told(PULSE, method="rk4", step=0.05)
-    assert told(PULSE, method="rk4", step=0.05, output_times=[10.0])
+    assert not has_missed_feature(PULSE, method=mstmm.methods.Method(max_step=1e-3))
+    assert not has_missed_feature(PULSE, method="rk4", step=1e-3)
+    assert has_missed_feature(PULSE, method="rk4", step=0.05)
+    assert has_missed_feature(PULSE, method="rk4", step=0.05, output_times=[10.0])
 
 
 def test_it_is_where_the_motion_comes_by() -> None:
-    assert not told(PULSE, speed=0.1)
+    assert not has_missed_feature(PULSE, speed=0.1)
 
 
 def test_a_window_that_is_too_wide_is_no_help() -> None:
     wide = f"where(q > 4, where(q < 6, {PULSE}, 0), 0)"
     run = mstmm.compile(motor(wide, speed=1.0), engine="looped").simulate(10.0)
     assert run.u[-1, 0] == pytest.approx(1.0, abs=1e-6)  # it was missed
-    assert told(wide)
+    assert has_missed_feature(wide)
 
 
 @pytest.mark.parametrize("effort", [
@@ -59,7 +59,7 @@ def test_a_window_that_is_too_wide_is_no_help() -> None:
     "10*(1 - q^2)*u - q", "-2*u - 0.5*u*abs(u)", "-q + 0.2*sin(5*q)*cos(2*u)",
 ])  # fmt: skip
 def test_what_control_of_the_error_sees_is_let_be(effort: str) -> None:
-    assert not told(effort)
+    assert not has_missed_feature(effort)
 
 
 SLIDE: dict[str, Any] = {"name": "h", "type": "prismatic", "axis": [1, 0, 0],
@@ -68,8 +68,8 @@ FLAT: dict[str, Any] = {"name": "h", "type": "planar", "inboard": "ground", "out
 BODY: dict[str, Any] = {"name": "b", "mass": 1.0, "inertia": [1, 1, 1]}
 
 
-def warned(hinge: dict[str, Any], t_end: float = 10.0, **more: Any) -> tuple[bool, Result]:
-    """Whether a run, of `options`, of one body says that its steps have passed over something."""
+def warning_and_run(hinge: dict[str, Any], t_end: float = 10.0, **more: Any) -> tuple[bool, Result]:
+    """Whether a run of one body warns that its steps passed over a load, and that run."""
     options = more.pop("options", {})
     scene = mstmm.Scene(gravity=(0, 0, 0), body=[BODY], hinge=[hinge], **more)
     run = mstmm.compile(scene, engine="looped").simulate(t_end, certify=True, **options)
@@ -88,16 +88,16 @@ OUTPUTS: list[dict[str, Any]] = [
 def test_a_law_that_is_narrow_in_a_speed(options: dict[str, Any]) -> None:
     """It holds the speed where 100 exp(-x^2) = 0.1, which steps of seconds do not see."""
     hinge = SLIDE | {"law": {"effort": "-100*exp(-((u-0.5)/1e-4)^2)+0.1"}}
-    found, run = warned(hinge, options=options)
+    found, run = warning_and_run(hinge, options=options)
     assert (found and run.u[-1, 0] > 0.51) or options.get("step")
-    found, run = warned(hinge, options={"method": mstmm.methods.Method(max_step=1e-3)})
+    found, run = warning_and_run(hinge, options={"method": mstmm.methods.Method(max_step=1e-3)})
     assert not found
     assert run.u[-1, 0] == pytest.approx(0.5 - 1e-4 * np.sqrt(np.log(1000)), abs=1e-8)
 
 
 def test_a_speed_that_a_pulse_would_have_changed() -> None:
     """From 4 m/s on it is ahead by the time that the pulse saves, 1.2e-4 s, times 1 m/s^2."""
-    found, run = warned(SLIDE | {"law": {"effort": "1 + 30*exp(-((u - 4)/1e-4)^2)"}})
+    found, run = warning_and_run(SLIDE | {"law": {"effort": "1 + 30*exp(-((u - 4)/1e-4)^2)"}})
     assert found and run.u[-1, 0] == pytest.approx(10.0, abs=1e-9)  # it was missed
 
 
@@ -108,7 +108,7 @@ def test_a_load_that_is_narrow_in_two_coordinates(
 ) -> None:
     force = f"-300*exp(-(((h.q[0]-5)^2+(h.q[1]-{y})^2)/1e-4))"
     hinge = FLAT | {"initial": {"u": [1, 0.5, 0]}}
-    found, _ = warned(hinge, options=options, load=[{"on": "b", "force": [force, 0, 0]}])
+    found, _ = warning_and_run(hinge, options=options, load=[{"on": "b", "force": [force, 0, 0]}])
     assert found == there
 
 
@@ -118,7 +118,7 @@ def test_a_load_on_an_orbit_that_output_times_do_not_show() -> None:
     force[0] += " + 50*exp(-((h.q[0]+1)^2+(h.q[1]-0.02)^2)/1e-5)"
     hinge = FLAT | {"initial": {"q": [1, 0, 0], "u": [0, 1, 0]}}
     turns = 2 * np.pi * np.arange(4)
-    found, _ = warned(
+    found, _ = warning_and_run(
         hinge, turns[-1], options={"output_times": turns},
         load=[{"on": "b", "force": [*force, 0]}],
     )  # fmt: skip
@@ -128,16 +128,16 @@ def test_a_load_on_an_orbit_that_output_times_do_not_show() -> None:
 def test_a_spring_whose_effort_is_narrow_in_its_length() -> None:
     spring = {"name": "s", "from": "ground", "to": "b", "law": {"effort": PULSE}}
     hinge = SLIDE | {"initial": {"q": [1.0], "u": [1.0]}}
-    found, _ = warned(hinge, spring=[spring])
+    found, _ = warning_and_run(hinge, spring=[spring])
     assert found
-    found, _ = warned(hinge, spring=[spring | {"law": {"effort": "0.1*sin(q)"}}])
+    found, _ = warning_and_run(hinge, spring=[spring | {"law": {"effort": "0.1*sin(q)"}}])
     assert not found
 
 
 def test_a_law_in_a_speed_that_an_input_moves() -> None:
     channel = {"name": "where_", "value": 0.5}
     hinge = SLIDE | {"law": {"effort": "-100*exp(-((u-where_)/1e-4)^2)+0.1"}}
-    found, _ = warned(hinge, input=[channel])
+    found, _ = warning_and_run(hinge, input=[channel])
     assert found
 
 

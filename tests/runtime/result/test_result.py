@@ -34,7 +34,7 @@ def slope(values: Array, width: float = 1e-4) -> Array:
     return np.asarray((a - 8 * b + 8 * d - e) / (12 * width))
 
 
-def turned(q: Array, x: Array) -> Array:
+def rotate_vectors(q: Array, x: Array) -> Array:
     """Vectors x turned by unit quaternions q (w, x, y, z)."""
     v = q[..., 1:]
     return np.asarray(x + 2 * np.cross(v, q[..., :1] * x + np.cross(v, x)))
@@ -69,14 +69,14 @@ def test_ends_are_fixed_in_their_bodies(run: Result) -> None:
     for body in run.model.scene.body:
         for name, end in body.ends.items():
             tip = f"{body.name}.{name}"
-            offset = turned(run.orientation(body.name), np.array(end.position))
+            offset = rotate_vectors(run.orientation(body.name), np.array(end.position))
             np.testing.assert_allclose(
                 run.position(tip), run.position(body.name) + offset, atol=1e-14
             )
             x = np.array([0.3, -0.2, 0.9])
             np.testing.assert_allclose(
-                turned(run.orientation(tip), x),
-                turned(run.orientation(body.name), np.array(end.rotation) @ x),
+                rotate_vectors(run.orientation(tip), x),
+                rotate_vectors(run.orientation(body.name), np.array(end.rotation) @ x),
                 atol=1e-14,
             )
 
@@ -100,7 +100,7 @@ def outer(result: Result, k: int) -> dict[str, list[tuple[Array, Array]]]:
     """(force, point) of the load and the spring of the tree."""
     t = result.t[k]
     tip = result.orientation("arm")[k]
-    push = turned(tip, np.array([np.cos(2 * t), 0.5, 0.0]))
+    push = rotate_vectors(tip, np.array([np.cos(2 * t), 0.5, 0.0]))
     arm = result.position("paddle")[k] - np.array([1.0, 1.0, 0.0])
     length = float(np.linalg.norm(arm))
     rate = float(result.velocity("paddle")[k] @ arm / length)
@@ -116,7 +116,7 @@ def test_forces_and_moments_move_every_body(run: Result, k: int) -> None:
     """Newton and Euler for each body from the loads of its hinges, inboard on outboard."""
     scene, loads = run.model.scene, loads_on(run, k)
     for body in scene.body:
-        turn = np.array([turned(run.orientation(body.name)[k], e) for e in np.eye(3)]).T
+        turn = np.array([rotate_vectors(run.orientation(body.name)[k], e) for e in np.eye(3)]).T
         arm = turn @ np.array(body.center_of_mass)
         w, alpha = run.angular_velocity(body.name)[k], run.angular_acceleration(body.name)[k]
         a = run.acceleration(body.name)[k] + np.cross(alpha, arm) + np.cross(w, np.cross(w, arm))
@@ -142,16 +142,18 @@ def test_energies_and_momentum_are_sums_over_the_bodies(run: Result) -> None:
     kinetic = gravity = np.zeros(len(run.t))
     momentum, turning = np.zeros(3), np.zeros(3)
     for body in run.model.scene.body:
-        arm = turned(run.orientation(body.name), np.array(body.center_of_mass))
+        arm = rotate_vectors(run.orientation(body.name), np.array(body.center_of_mass))
         w = run.angular_velocity(body.name)
         v, x = run.velocity(body.name) + np.cross(w, arm), run.position(body.name) + arm
         back = run.orientation(body.name) * np.array([1, -1, -1, -1])
-        own = turned(back, w)
+        own = rotate_vectors(back, w)
         spin = own @ np.array(body.inertia_matrix)
         kinetic = kinetic + body.mass * np.sum(v * v, 1) / 2 + np.sum(own * spin, 1) / 2
         gravity = gravity - body.mass * x @ np.array(run.model.scene.gravity)
         momentum = momentum + body.mass * v
-        turning = turning + np.cross(x, body.mass * v) + turned(run.orientation(body.name), spin)
+        turning = (
+            turning + np.cross(x, body.mass * v) + rotate_vectors(run.orientation(body.name), spin)
+        )
     length = np.linalg.norm(run.position("paddle") - [1, 1, 0], axis=1)
     hinge = run.coordinates("elbow") ** 2 @ np.array([3.0, 2.0]) / 2
     parts = run.energy_components()

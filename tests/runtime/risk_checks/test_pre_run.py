@@ -13,7 +13,7 @@ from mstmm.runtime.risk_checks.pre_run import check_before_run
 from tests.support.scenes.results import motor, rod
 
 
-def seen(scene: mstmm.Scene, t_end: float = 10.0, **settings: Any) -> list[Risk]:
+def risks_before_run(scene: mstmm.Scene, t_end: float = 10.0, **settings: Any) -> list[Risk]:
     model = mstmm.compile(scene, engine="looped", sweep="riccati")
     found = check_before_run(model, Settings(t_end, **settings), *model.initial_state()).risks
     assert all(risk.seen_before_run for risk in found)
@@ -34,22 +34,22 @@ def chain(masses: list[float]) -> mstmm.Scene:
 
 
 def test_a_heavy_tip_is_seen() -> None:
-    (risk,) = seen(chain([1.0, 1.0, 1.0, 1.0, 1e11]))
+    (risk,) = risks_before_run(chain([1.0, 1.0, 1.0, 1.0, 1e11]))
     assert risk.name == "pivot-loss" and risk.element.startswith('hinge "pin')
     assert risk.value is not None and risk.value > 1e9
 
 
 @pytest.mark.parametrize("root, tip", [(1.0, 1.0), (1e11, 1.0), (1.0, 1e3)])
 def test_a_heavy_root_and_a_light_weight_are_let_be(root: float, tip: float) -> None:
-    assert not seen(chain([root, 1.0, 1.0, 1.0, tip]))
+    assert not risks_before_run(chain([root, 1.0, 1.0, 1.0, tip]))
 
 
 def test_masses_that_are_alike_are_not_even_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
-    def looked(*_: Any) -> None:
+    def refuse_call(*_: Any) -> None:
         raise AssertionError("pivots were computed")
 
-    monkeypatch.setattr("mstmm.runtime.risk_checks.mass_ratio.pivot_loss", looked)
-    assert not seen(chain([1.0, 2.0, 5.0]))
+    monkeypatch.setattr("mstmm.runtime.risk_checks.mass_ratio.pivot_loss", refuse_call)
+    assert not risks_before_run(chain([1.0, 2.0, 5.0]))
 
 
 # --- angles ---------------------------------------------------------------------------------------
@@ -67,7 +67,7 @@ def test_three_angles_that_begin_or_are_driven_into_their_lock(
     how: dict[str, Any] = {"initial": {"q": [0.0, angle, 0.0]}}
     if drive is not None:
         how = {"drive": ["free", drive, "free"]}
-    found = seen(mstmm.Scene(gravity=(0, 0, 0), body=[body], hinge=[rings | how]))
+    found = risks_before_run(mstmm.Scene(gravity=(0, 0, 0), body=[body], hinge=[rings | how]))
     assert [(risk.name, risk.element) for risk in found] == (
         [("gimbal", 'hinge "rings"')] if told else []
     )
@@ -77,7 +77,7 @@ def test_three_angles_that_begin_or_are_driven_into_their_lock(
 def test_hinges_without_such_angles_are_let_be(kind: str) -> None:
     held = {"name": "held", "type": kind, "inboard": "ground", "outboard": "rod"}
     scene = mstmm.Scene(gravity=(0, 0, 0), body=[rod("rod")], hinge=[held])
-    assert not seen(scene)
+    assert not risks_before_run(scene)
 
 
 # --- spin -----------------------------------------------------------------------------------------
@@ -96,7 +96,7 @@ SPIN_UP = "0.1*t^2"  # 2 rad/s at 10 s
 
 @pytest.mark.parametrize("stiffening", [False, True])
 def test_a_linear_beam_that_will_be_spun_up(stiffening: bool) -> None:
-    found = seen(blade(stiffening, drive=SPIN_UP))
+    found = risks_before_run(blade(stiffening, drive=SPIN_UP))
     assert [risk.name for risk in found] == ([] if stiffening else ["stiffening"])
     for risk in found:
         assert risk.value == pytest.approx(2 / 3.516, rel=0.01)
@@ -104,11 +104,11 @@ def test_a_linear_beam_that_will_be_spun_up(stiffening: bool) -> None:
 
 
 def test_the_end_of_the_run_and_the_start_count() -> None:
-    assert not seen(blade(False, drive=SPIN_UP), t_end=4.0)
+    assert not risks_before_run(blade(False, drive=SPIN_UP), t_end=4.0)
     spinning = {"initial": {"u": [2.0]}}
-    assert [risk.name for risk in seen(blade(False, **spinning)) if risk.invalidates] == [
-        "stiffening"
-    ]
+    assert [
+        risk.name for risk in risks_before_run(blade(False, **spinning)) if risk.invalidates
+    ] == ["stiffening"]
 
 
 def test_a_run_that_spins_a_linear_beam_is_refused() -> None:
@@ -124,7 +124,7 @@ def test_a_run_that_spins_a_linear_beam_is_refused() -> None:
 @pytest.mark.parametrize("rate, told", [(10.0, False), (60.0, True)])
 def test_a_drive_faster_than_the_shapes(rate: float, told: bool) -> None:
     """Two shapes: 3.5 and 22 rad/s."""
-    found = seen(blade(True, drive=f"0.001*sin({rate}*t)"))
+    found = risks_before_run(blade(True, drive=f"0.001*sin({rate}*t)"))
     assert [(risk.name, risk.element, risk.invalidates) for risk in found] == (
         [("shapes", '"blade"', False)] if told else []
     )
@@ -135,7 +135,7 @@ def test_a_drive_faster_than_the_shapes(rate: float, told: bool) -> None:
 ])  # fmt: skip
 def test_a_damper_that_explicit_steps_must_follow(damping: float, method: str, told: bool) -> None:
     """A rod of 1/3 kg m2: 3000 1/s over 10 s."""
-    found = seen(motor("0", damping=damping), method=method)
+    found = risks_before_run(motor("0", damping=damping), method=method)
     assert [(risk.name, risk.invalidates) for risk in found] == ([("stiff", False)] if told else [])
 
 
@@ -146,7 +146,7 @@ def test_a_damper_that_explicit_steps_must_follow(damping: float, method: str, t
 def test_a_pulse_that_fixed_steps_pass_over(step: float | None, told: bool) -> None:
     scene = motor("exp(-((t - 5)/0.001)^2)")
     method = "dop853" if step is None else "rk4"
-    found = seen(scene, method=method, step=step)
+    found = risks_before_run(scene, method=method, step=step)
     assert [risk.name for risk in found] == (["narrow-load"] if told else [])
 
 
@@ -169,5 +169,5 @@ def test_a_start_from_which_a_mechanism_can_go_on_two_ways(
         for hinge, speed in zip(hinges, speeds, strict=True)
     ]
     bodies = [rod(name) for name in ("crank", "coupler", "rocker")]
-    found = seen(mstmm.Scene(gravity=(0, -9.81, 0), body=bodies, hinge=given))
+    found = risks_before_run(mstmm.Scene(gravity=(0, -9.81, 0), body=bodies, hinge=given))
     assert [risk.name for risk in found] == (["branching-start"] if told else [])

@@ -16,7 +16,7 @@ from tests.support.scenes.results import motor, pins, rod
 COARSE: dict[str, Any] = {"method": "rk4", "step": 0.2}
 
 
-def damped() -> mstmm.Model:
+def damped_rod_model() -> mstmm.Model:
     """One rod whose damper a step of 0.02 s is too long for."""
     return mstmm.compile(motor("0", damping=100.0))
 
@@ -72,12 +72,12 @@ def test_what_the_run_has_seen_stands_for_what_was_seen_before() -> None:
 
 
 def test_a_run_is_refused_before_it_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
-    model = damped()
+    model = damped_rod_model()
 
-    def made(*_: Any) -> None:
+    def refuse_run(*_: Any) -> None:
         raise AssertionError("a run was made")
 
-    monkeypatch.setattr("mstmm.runtime.model.run_results.first_run", made)
+    monkeypatch.setattr("mstmm.runtime.model.run_results.first_run", refuse_run)
     with pytest.raises(mstmm.RiskRefused, match=r"before the run:\n  step-stability: step") as seen:
         model.simulate(1.0, method="rk4", step=0.05, execution=mstmm.Execution(on_risk="refuse"))
     (risk,) = seen.value.risks
@@ -171,10 +171,10 @@ def test_a_saved_result_has_the_same(tmp_path: Path) -> None:
 
 
 def test_a_look_that_is_interrupted_loses_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupted(_: mstmm.Result) -> None:
+    def raise_interrupt(_: mstmm.Result) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(mstmm.Result, "risks", property(interrupted))
+    monkeypatch.setattr(mstmm.Result, "risks", property(raise_interrupt))
     with pytest.raises(mstmm.RiskRefused, match="interrupted") as refused:
         swinging().simulate(0.5, execution=mstmm.Execution(on_risk="refuse"))
     assert refused.value.result.success and refused.value.result.t[-1] == 0.5

@@ -23,7 +23,7 @@ def scene(base: dict[str, Any] = WALL, beam: Any = None, **more: Any) -> mstmm.S
     return mstmm.Scene(gravity=[0, 0, 0], beam=[table], hinge=hinges, **more)
 
 
-def compiled(*arguments: Any, **more: Any) -> mstmm.Model:
+def beam_model(*arguments: Any, **more: Any) -> mstmm.Model:
     return mstmm.compile(scene(*arguments, **more), engine="looped")
 
 
@@ -40,7 +40,7 @@ def compiled(*arguments: Any, **more: Any) -> mstmm.Model:
 def test_shapes_hold_up_to_the_last_motion_that_they_have(
     hinge: Any, beam: Any, root: float
 ) -> None:
-    limit = shape_limits(compiled(hinge, beam))["b"]
+    limit = shape_limits(beam_model(hinge, beam))["b"]
     assert limit == pytest.approx(root**2, rel=1e-3)
 
 
@@ -50,7 +50,7 @@ def test_shapes_without_a_moment_hold_little_where_the_end_takes_one() -> None:
     weld = {"name": "w", "type": "fixed", "inboard": "b.tip", "outboard": "r"}
     more = {"body": [body], "hinge": [weld]}
     poor, good = (
-        shape_limits(compiled(beam=beam, **more))["b"]
+        shape_limits(beam_model(beam=beam, **more))["b"]
         for beam in ({"basis": "clamped-free", "modes": {"y": 4}}, {"modes": {"y": 4}})
     )
     clamped = FF  # bars clamped at both ends have the roots of free ones
@@ -65,7 +65,7 @@ def receptance(omega: float) -> float:
 
 
 def test_a_response_is_doubted_where_it_errs() -> None:
-    linear = compiled().linearize(disturbances=["b.tip.force.y"])
+    linear = beam_model().linearize(disturbances=["b.tip.force.y"])
     for omega, right in ((0.5 * CF[2] ** 2, True), (0.97 * CF[2] ** 2, True), (100.0, False)):
         answer = linear.frequency_response([1.0, omega], outputs=["b.tip.position.y"])
         error = abs(answer.response[1, 0, 0] / receptance(omega) - 1)
@@ -77,7 +77,7 @@ def test_a_response_is_doubted_where_it_errs() -> None:
 
 
 def test_exact_beams_have_no_limit() -> None:
-    linear = compiled().linearize(disturbances=["b.tip.force.y"])
+    linear = beam_model().linearize(disturbances=["b.tip.force.y"])
     answer = linear.frequency_response([100.0], outputs=["b.tip.position.y"], exact=True)
     assert answer.trusted
     assert abs(answer.response[0, 0, 0]) == pytest.approx(abs(receptance(100.0)), rel=1e-6)
@@ -85,7 +85,7 @@ def test_exact_beams_have_no_limit() -> None:
 
 def test_motions_that_shapes_have_too_high_are_doubted() -> None:
     """The fourth of four static and fixed-interface shapes is 9 % too high."""
-    model = compiled(beam={"basis": "static+fixed-interface", "modes": {"y": 4}})
+    model = beam_model(beam={"basis": "static+fixed-interface", "modes": {"y": 4}})
     requested = model.linearize().modes(4)
     assert requested.omega[3] > 1.05 * 10.9955**2
     (risk,) = (risk for risk in requested.risks if risk.name == "frequency-range")
@@ -94,7 +94,7 @@ def test_motions_that_shapes_have_too_high_are_doubted() -> None:
 
 
 def test_of_all_modes_the_highest_are_noted_and_no_objection() -> None:
-    model = compiled(beam={"basis": "static+fixed-interface", "modes": {"y": 4}})
+    model = beam_model(beam={"basis": "static+fixed-interface", "modes": {"y": 4}})
     every = model.linearize().modes()
     assert [(risk.name, risk.invalidates) for risk in every.risks] == [("frequency-range", False)]
     assert every.trusted
@@ -102,7 +102,7 @@ def test_of_all_modes_the_highest_are_noted_and_no_objection() -> None:
 
 def test_all_modes_are_doubted_where_the_first_is_beyond_the_shapes() -> None:
     """Half a sine wave is no shape of a cantilever."""
-    model = compiled(beam={"basis": "simply-supported", "modes": {"y": 1}})
+    model = beam_model(beam={"basis": "simply-supported", "modes": {"y": 1}})
     every = model.linearize().modes()
     assert every.omega[0] > 1.05 * CF[0] ** 2
     assert not every.trusted

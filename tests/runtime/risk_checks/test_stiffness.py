@@ -21,7 +21,9 @@ def swinging() -> mstmm.Scene:
     return mstmm.Scene.from_data(data)
 
 
-def advised(scene: mstmm.Scene, t_end: float, engine: str = "looped", **how: Any) -> list[Risk]:
+def stiffness_risks(
+    scene: mstmm.Scene, t_end: float, engine: str = "looped", **how: Any
+) -> list[Risk]:
     run = mstmm.compile(scene, engine=engine).simulate(t_end, **how)
     return [risk for risk in run.risks if risk.name == "stiff"]
 
@@ -30,7 +32,7 @@ def advised(scene: mstmm.Scene, t_end: float, engine: str = "looped", **how: Any
 @pytest.mark.parametrize("method", ["dop853", "dopri5"])
 def test_what_is_advised_saves_as_much_as_is_said(method: str, engine: str) -> None:
     how: dict[str, Any] = {"rtol": 1e-3, "atol": 1e-6}
-    (risk,) = advised(swinging(), 5.0, engine, method=method, **how)
+    (risk,) = stiffness_risks(swinging(), 5.0, engine, method=method, **how)
     assert not risk.invalidates and risk.value is not None and risk.limit is not None
     assert 'method = "rodas4p2"' in risk.remedy
     run = mstmm.compile(swinging(), engine=engine).simulate(5.0, method="rodas4p2", **how)
@@ -54,7 +56,7 @@ def test_a_vibration_that_steps_must_follow_is_let_be(method: str, engine: str) 
 
 
 def test_before_a_run_the_start_is_looked_at() -> None:
-    (risk,) = advised(
+    (risk,) = stiffness_risks(
         motor("0", damping=1e3), 100.0, method=mstmm.methods.Method("dop853", max_steps=100)
     )
     assert (
@@ -67,4 +69,4 @@ def test_before_a_run_the_start_is_looked_at() -> None:
     {"method": "auto"}, {"method": "rodas4p2"}, {"method": "rk4", "step": 1e-3},
 ])  # fmt: skip
 def test_other_methods_are_let_be(how: dict[str, Any]) -> None:
-    assert not advised(motor("sin(t)", damping=100.0), 2.0, **how)
+    assert not stiffness_risks(motor("sin(t)", damping=100.0), 2.0, **how)

@@ -109,8 +109,8 @@ def test_ctrl_c_and_resume_give_the_bytes_of_an_uninterrupted_run(
             assert one[name][: len(part["t"])].tobytes() == part[name].tobytes(), name
 
 
-def interrupted(monkeypatch: pytest.MonkeyPatch, at: float) -> None:
-    """Ctrl-C, from within, as soon as a run has passed this time."""
+def interrupt_run(monkeypatch: pytest.MonkeyPatch, at: float) -> None:
+    """Send Ctrl-C from within as soon as a run has passed the time `at`."""
     monkeypatch.setattr("mstmm.runtime.run.integration_run.SLICE", 0.0)
 
     def report_and_save(self: run_execution.RunMonitor, run: Integrator, earlier: object) -> None:
@@ -125,7 +125,7 @@ def test_a_checkpoint_of_another_run_is_refused(
 ) -> None:
     path, model = tmp_path / "run.npz", mstmm.compile(pins(2, [0.3, 0.4]))
     with monkeypatch.context() as patch:
-        interrupted(patch, 1.0)
+        interrupt_run(patch, 1.0)
         run = model.simulate(
             5.0, execution=mstmm.Execution(checkpoint=path), step=0.01, method="rk4"
         )
@@ -211,7 +211,7 @@ def test_the_time_of_all_pieces_is_kept(
     path, model = tmp_path / "run.npz", mstmm.compile(pins(2, [0.3, 0.4]))
     for at in (1.0, 2.0):
         with monkeypatch.context() as patch:
-            interrupted(patch, at)
+            interrupt_run(patch, at)
             run = model.simulate(
                 5.0,
                 execution=mstmm.Execution(checkpoint=path, resume=at > 1),

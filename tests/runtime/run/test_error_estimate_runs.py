@@ -27,7 +27,7 @@ def true_error(run: Result) -> float:
     return float(np.abs(run.q[first] - best.q).max())
 
 
-def estimated(run: Result) -> float:
+def estimated_error(run: Result) -> float:
     error = run.certificate.error
     assert error is not None
     return max(error.difference().values())
@@ -36,7 +36,7 @@ def estimated(run: Result) -> float:
 @pytest.mark.parametrize("step", [0.3, 0.6, 1.0, 1.5, 2.5, 40.0])
 def test_a_step_longer_than_the_run_is_judged_by_shorter_ones(step: float) -> None:
     run = mstmm.compile(pins(1, [1.0])).simulate(1.0, method="rk4", step=step, certify=True)
-    assert true_error(run) / 3 < estimated(run) < 30 * true_error(run)
+    assert true_error(run) / 3 < estimated_error(run) < 30 * true_error(run)
     assert true_error(run) > 0.05
 
 
@@ -46,7 +46,7 @@ def test_breaks_that_cut_every_step_are_halved() -> None:
     model = mstmm.compile(motor(f"{effort} - q - q^3"))
     for step in (0.6, 3.0):
         run = model.simulate(4.0, method="rk4", step=step, certify=True)
-        assert true_error(run) / 3 < estimated(run) < 30 * true_error(run)
+        assert true_error(run) / 3 < estimated_error(run) < 30 * true_error(run)
         assert true_error(run) > 1e-3
 
 
@@ -54,7 +54,7 @@ def test_an_adaptive_run_of_one_step_is_judged_by_several() -> None:
     run = mstmm.compile(pins(1, [1.0])).simulate(0.01, "dopri5", certify=True, rtol=1e-3, atol=1e-3)
     assert run.statistics is not None
     assert run.statistics.steps <= 2
-    assert estimated(run) >= true_error(run) / 3 > 0
+    assert estimated_error(run) >= true_error(run) / 3 > 0
 
 
 @pytest.mark.parametrize("rtol", [0.5, 1.0, 3.0, 100.0])
@@ -64,7 +64,7 @@ def test_a_tolerance_that_bounds_nothing(method: str, rtol: float) -> None:
         options: dict[str, Any] = {"method": method, "rtol": rtol, "atol": 1e-12}
         run = mstmm.compile(scene).simulate(t_end, certify=True, **options)
         assert run.success
-        assert estimated(run) >= true_error(run) / 3
+        assert estimated_error(run) >= true_error(run) / 3
 
 
 def test_a_run_that_repeats_the_first_gives_no_estimate() -> None:
@@ -82,14 +82,14 @@ def test_a_run_that_repeats_the_first_gives_no_estimate() -> None:
 
 def test_one_output_time_is_enough_for_an_estimate() -> None:
     run = mstmm.compile(pins(1, [1.0])).simulate(3.0, output_times=[3.0], certify=True, rtol=1e-6)
-    assert true_error(run) / 3 <= estimated(run) < 30 * true_error(run)
+    assert true_error(run) / 3 <= estimated_error(run) < 30 * true_error(run)
     lost = mstmm.compile(pins(2, [0.3, 0.5])).simulate(
         30.0, output_times=[30.0], certify=True, rtol=1e-6
     )
     error = lost.certificate.error
     assert error is not None
     assert error.divergence_time == 0.0
-    assert estimated(lost) > 0.1
+    assert estimated_error(lost) > 0.1
 
 
 def test_a_second_run_that_fails_tells_only_of_the_time_that_it_covers(

@@ -26,7 +26,7 @@ LOOSE: dict[str, Any] = {"rtol": 1e-4, "atol": 1e-6}
 ARRAYS = ("t", "q", "u", "work", "event")
 
 
-def compiled(scene: dict[str, Any] | mstmm.Scene) -> Model:
+def compile_looped(scene: dict[str, Any] | mstmm.Scene) -> Model:
     made = scene if isinstance(scene, mstmm.Scene) else mstmm.Scene(**scene)
     return mstmm.compile(made, engine="looped")
 
@@ -46,7 +46,7 @@ def names(result: Result) -> list[str]:
     return [stretch.method for stretch in result.method_history]
 
 
-def pressed() -> dict[str, Any]:
+def pressed_slider() -> dict[str, Any]:
     """A slider of 1 kg that is pressed to a stop and pulled from it, once a second."""
     limits = {"lower": 0.0, "stiffness": 1e8, "damping": 2e4}
     hinge = {
@@ -83,7 +83,7 @@ def test_a_run_that_is_not_stiff_is_that_of_dop853(engine: str, options: dict[st
 
 @pytest.mark.parametrize("name", ["a10-1e4", "e"])
 def test_scenes_that_are_not_stiff_enough(name: str) -> None:
-    model = compiled(CASES[name].scene())
+    model = compile_looped(CASES[name].scene())
     auto, plain = (model.simulate(1.0, method=method, **LOOSE) for method in ("auto", "dop853"))
     assert equal(auto, plain) and names(auto) == ["dop853"]
 
@@ -104,7 +104,7 @@ def test_an_engine_compiled_on_the_way_changes_nothing(
 
 def test_stiff_rods_take_a_tenth_of_the_work() -> None:
     case = CASES["a10-1e8"]
-    model, (expected, _) = compiled(case.scene()), references.load_reference(case)
+    model, (expected, _) = compile_looped(case.scene()), references.load_reference(case)
     auto, plain = (
         model.simulate(case.t_end, method=method, **LOOSE) for method in ("auto", "dop853")
     )
@@ -120,7 +120,7 @@ def test_stiff_rods_take_a_tenth_of_the_work() -> None:
 
 
 def test_contact_on_and_off_changes_the_method_both_ways() -> None:
-    model = compiled(pressed())
+    model = compile_looped(pressed_slider())
     run = model.simulate(3.0, method="auto", rtol=1e-5, atol=1e-9)
     exact = model.simulate(3.0, rtol=1e-10, atol=1e-13)
     assert run.success and names(run) == ["dop853", *["rodas4p2", "dop853"] * 3]
@@ -134,7 +134,7 @@ def test_contact_on_and_off_changes_the_method_both_ways() -> None:
 
 
 def test_events_breaks_and_releases_go_on_across_a_change() -> None:
-    model = compiled(eventful())
+    model = compile_looped(eventful())
     run = model.simulate(2.0, method="auto", rtol=1e-6, atol=1e-8)
     exact = model.simulate(2.0, rtol=1e-8, atol=1e-10)
     assert names(run) == ["dop853", "rodas5p"] and run.method_history[1].t < 0.2
@@ -147,7 +147,7 @@ def test_events_breaks_and_releases_go_on_across_a_change() -> None:
 
 
 def test_slices_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    model = compiled(eventful())
+    model = compile_looped(eventful())
     options: dict[str, Any] = {"method": "auto", "rtol": 1e-6}
     whole = model.simulate(2.0, **options)
     monkeypatch.setattr("mstmm.runtime.run.integration_run.SLICE", 0.0)
@@ -166,7 +166,7 @@ def test_an_interrupted_run_goes_on_bit_for_bit(
         if run.t > at:
             signal.raise_signal(signal.SIGINT)
 
-    model, path = compiled(eventful()), tmp_path / "run.npz"
+    model, path = compile_looped(eventful()), tmp_path / "run.npz"
     options: dict[str, Any] = {"method": "auto", "rtol": 1e-6}
     whole = model.simulate(2.0, **options)
     with monkeypatch.context() as patch:
@@ -189,7 +189,7 @@ def test_an_interrupted_run_goes_on_bit_for_bit(
     ' "asked_for": [5, 0, 0], "since": 0}',
 ])  # fmt: skip
 def test_an_edited_checkpoint_is_refused(tmp_path: Path, methods: str) -> None:
-    model, path = compiled(pins(1, [0.3])), tmp_path / "run.npz"
+    model, path = compile_looped(pins(1, [0.3])), tmp_path / "run.npz"
     model.simulate(1.0, method="auto", execution=mstmm.Execution(checkpoint=path))
     with np.load(path) as file:
         data = {key: file[key] for key in file.files}
@@ -204,7 +204,7 @@ def test_where_implicit_steps_fail_the_run_goes_on_explicitly(
     """A tangent that is singular from 0.02 s on costs a change, not the run."""
     offer, kept = SceneSystem.offer_tangent, list[Any]()
 
-    def offered(system: SceneSystem) -> None:
+    def offer_failing_tangent(system: SceneSystem) -> None:
         offer(system)
         ffi, given = system.engine.ffi, system.system.implicit
         failing = ffi.new("mstmm_implicit *", given[0])
@@ -216,8 +216,8 @@ def test_where_implicit_steps_fail_the_run_goes_on_explicitly(
         failing.tangent, system.system.implicit = called, failing
         kept.append((failing, called))
 
-    monkeypatch.setattr(SceneSystem, "offer_tangent", offered)
-    model = compiled(scenes.bushed_rods(2, 1e8, 0.1))
+    monkeypatch.setattr(SceneSystem, "offer_tangent", offer_failing_tangent)
+    model = compile_looped(scenes.bushed_rods(2, 1e8, 0.1))
     run = model.simulate(0.1, method="auto", **LOOSE)
     assert run.success and names(run) == ["dop853", "rodas4p2", "dop853"]
     assert (
@@ -229,19 +229,19 @@ def test_where_implicit_steps_fail_the_run_goes_on_explicitly(
 
 
 def test_scenes_without_implicit_methods_stay_explicit(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refused(*_: object) -> None:
+    def refuse_tangent(*_: object) -> None:
         raise mstmm.SceneError('hinge "cam" has no derivatives')
 
-    model = compiled(CASES["f"].scene())
+    model = compile_looped(CASES["f"].scene())
     plain = model.simulate(0.03, **LOOSE)
-    monkeypatch.setattr("mstmm.runtime.run.spectral_radius.TangentMatrix", refused)
+    monkeypatch.setattr("mstmm.runtime.run.spectral_radius.TangentMatrix", refuse_tangent)
     run = model.simulate(0.03, method="auto", **LOOSE)
     assert equal(run, plain) and names(run) == ["dop853", "dop853"]
     assert run.method_history[1].reason == 'no implicit method: hinge "cam" has no derivatives'
 
 
 def test_trajectories_of_a_batch_choose_for_themselves() -> None:
-    model = compiled(pressed())
+    model = compile_looped(pressed_slider())
     q, u = np.array([[0.01], [3.0], [0.02]]), np.zeros((3, 1))
     options: dict[str, Any] = {"method": "auto", "rtol": 1e-5, "atol": 1e-9}
     batch = model.simulate_batch((q, u), t_end=0.4, threads=2, **options)
@@ -264,7 +264,7 @@ def test_trajectories_of_a_batch_choose_for_themselves() -> None:
 
 
 def test_what_it_did_is_saved_with_the_result(tmp_path: Path) -> None:
-    model = compiled(CASES["a10-1e8"].scene())
+    model = compile_looped(CASES["a10-1e8"].scene())
     run = model.simulate(0.2, method="auto", **LOOSE)
     assert len(run.method_history) == 2
     loaded = mstmm.load_result(run.save(tmp_path / "run.nc"))
@@ -274,13 +274,15 @@ def test_what_it_did_is_saved_with_the_result(tmp_path: Path) -> None:
 
 
 def test_its_error_is_estimated_as_that_of_any_method() -> None:
-    run = compiled(CASES["a10-1e8"].scene()).simulate(0.3, method="auto", certify=True, **LOOSE)
+    run = compile_looped(CASES["a10-1e8"].scene()).simulate(
+        0.3, method="auto", certify=True, **LOOSE
+    )
     error = run.certificate.error
     assert error is not None and 0.0 < error.largest("q")["m"] < 1e-3
 
 
 def test_what_makes_no_sense_with_it_is_refused() -> None:
-    model = compiled(pins(1, [0.3]))
+    model = compile_looped(pins(1, [0.3]))
     state = model.initial_state()
     with pytest.raises(mstmm.SceneError, match=r'step = 0\.01: method "auto" chooses its steps'):
         model.simulate(1.0, method="auto", step=0.01)
@@ -301,7 +303,7 @@ def test_a_run_without_a_method_is_changed_where_it_is_stiff() -> None:
     the stiff joint then holds two rods as one."""
     scene = pins(2, [0.3, 0.0]).model_dump(by_alias=True, exclude_none=True)
     scene["hinge"][1]["law"] = {"damping": [1e6]}
-    run = compiled(scene).simulate(2.0)
+    run = compile_looped(scene).simulate(2.0)
     assert run.success and run.settings.method == "auto" and len(names(run)) > 1
     assert run.statistics is not None and run.statistics.steps < 5000
     assert np.abs(run.q[:, 1]).max() < 1e-4
@@ -309,19 +311,19 @@ def test_a_run_without_a_method_is_changed_where_it_is_stiff() -> None:
 
 @pytest.mark.parametrize("options", [{}, {"certify": True}, {"output_times": [0.5, 1.0]}])
 def test_a_run_without_a_method_that_is_not_stiff_is_one_by_dop853(options: dict[str, Any]) -> None:
-    model = compiled(pins(2, [1.0, 0.5]))
+    model = compile_looped(pins(2, [1.0, 0.5]))
     run, named = model.simulate(1.0, **options), model.simulate(1.0, "dop853", **options)
     assert equal(run, named) and run.settings == named.settings and run.method_history == ()
     assert run.statistics == named.statistics and run.warnings == named.warnings
 
 
 def test_fixed_steps_without_a_method_are_those_of_dop853() -> None:
-    run = compiled(pins(1, [1.0])).simulate(1.0, step=0.01)
+    run = compile_looped(pins(1, [1.0])).simulate(1.0, step=0.01)
     assert run.settings.method == "dop853"
 
 
 def test_a_run_without_a_method_is_resumed(tmp_path: Path) -> None:
-    model, path = compiled(pressed()), tmp_path / "run.checkpoint"
+    model, path = compile_looped(pressed_slider()), tmp_path / "run.checkpoint"
     whole = model.simulate(2.0, **LOOSE)
 
     def stop(t: float, _: float) -> None:

@@ -22,28 +22,28 @@ def swung(step: float, method: str | mstmm.methods.Method, **more: Any) -> Resul
     return model.simulate(2.0, method, step, **more)
 
 
-def told(result: Result) -> list[str]:
+def step_warnings(result: Result) -> list[str]:
     return [text for text in result.warnings if "too long for the motion" in text]
 
 
 @pytest.mark.parametrize("method", ["genalpha", "dttmm", "hht", "newmark", "rodas4", "rodas4p2"])
 def test_a_step_that_misses_the_motion_is_named_with_one_that_does_not(method: str) -> None:
     step = 0.15 if get(method).order == 2 else 0.1
-    (text,) = told(swung(step, method))
+    (text,) = step_warnings(swung(step, method))
     assert text.startswith(f"step = {step} s is too long for the motion")
     found = re.search(r"steps (\d+)% of the distance .* use a step below ([\d.]+) s", text)
     assert found is not None
     assert int(found[1]) >= 2
     shorter = float(found[2])
     assert step / 10 < shorter < step
-    assert not told(swung(0.9 * shorter, method, output_times=np.linspace(0.0, 2.0, 41)))
+    assert not step_warnings(swung(0.9 * shorter, method, output_times=np.linspace(0.0, 2.0, 41)))
 
 
 @pytest.mark.parametrize("method", ESTIMATING)
 def test_a_step_that_resolves_the_motion_is_not(method: str) -> None:
     result = swung(0.01, method)
     assert result.success
-    assert not told(result)
+    assert not step_warnings(result)
 
 
 @pytest.mark.parametrize("method", ["genalpha", "wilson", "rodas4p2"])
@@ -61,7 +61,7 @@ def test_the_length_of_a_run_does_not_matter() -> None:
     assert result.statistics is not None
     assert result.statistics.sum_of_local_errors is not None
     assert result.statistics.sum_of_local_errors > 0.05 * np.ptp(result.q)
-    assert not told(result)
+    assert not step_warnings(result)
 
 
 def test_energies_are_no_errors_of_the_motion() -> None:
@@ -76,7 +76,7 @@ def test_energies_are_no_errors_of_the_motion() -> None:
         assert np.ptp(result.work) > 1e8
         assert result.statistics is not None
         assert result.statistics.sum_of_local_errors == 0.0
-        assert not told(result)
+        assert not step_warnings(result)
 
 
 def test_what_rests_is_not_said_to_be_missed() -> None:
@@ -84,7 +84,7 @@ def test_what_rests_is_not_said_to_be_missed() -> None:
         1.0, "genalpha", 0.5
     )
     assert result.success
-    assert not told(result)
+    assert not step_warnings(result)
 
 
 def test_a_longest_step_beside_a_fixed_one_is_refused() -> None:

@@ -31,7 +31,9 @@ class Offer:
         self.nq, self.nu = model.nq, model.nu
         self.y = self.system.start(TIME, q, u)
         slope = np.zeros(self.nq + self.nu)
-        self._done(self.system.system.rhs(self._context, TIME, *self._pointers(self.y, slope)))
+        self._check_code(
+            self.system.system.rhs(self._context, TIME, *self._pointers(self.y, slope))
+        )
         self.a = slope[self.nq :]
 
     @property
@@ -41,18 +43,18 @@ class Offer:
     def _pointers(self, *arrays: Array) -> list[Any]:
         return [self.system.engine.pointer(array) for array in arrays]
 
-    def _done(self, code: int) -> None:
+    def _check_code(self, code: int) -> None:
         assert code == 0
 
     def inverse_mass(self) -> Array:
         """(nu, nu), by a tangent that is nothing but mass."""
         implicit, state = self.system.system.implicit, self._pointers(self.y, self.a)
         null = self.system.engine.ffi.NULL
-        self._done(implicit.tangent(self._context, TIME, *state, 2.0**200, 1.0, 0))
+        self._check_code(implicit.tangent(self._context, TIME, *state, 2.0**200, 1.0, 0))
         columns, dq, du = np.zeros((self.nu, self.nu)), np.zeros(self.nq), np.zeros(self.nu)
         for unit, column in zip(np.eye(self.nu), columns, strict=True):
             right, *found = self._pointers(unit, dq, du, column)
-            self._done(implicit.solve(self._context, right, null, null, *found))
+            self._check_code(implicit.solve(self._context, right, null, null, *found))
         return columns.T
 
     def state_matrix(self) -> Array:
@@ -63,7 +65,7 @@ class Offer:
         rates, r = np.zeros(self.nq), np.zeros(self.nu)
         for unit, column in zip(np.eye(n), columns, strict=True):
             along = self._pointers(unit[: self.nq].copy(), unit[self.nq :].copy(), rates, r)
-            self._done(slope(self._context, TIME, *state, *along))
+            self._check_code(slope(self._context, TIME, *state, *along))
             column[:] = np.concatenate([rates, -inverse @ r])
         return columns.T
 

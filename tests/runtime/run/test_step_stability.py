@@ -188,11 +188,11 @@ def test_a_run_costs_no_look_at_its_step(monkeypatch: pytest.MonkeyPatch) -> Non
     """It is looked at when somebody asks for what speaks against the numbers, once."""
     calls = []
 
-    def counted(*given: Any) -> Any:
+    def record_check(*given: Any) -> Any:
         calls.append(given)
         return check_step(*given)
 
-    monkeypatch.setattr(result_record, "check_step", counted)
+    monkeypatch.setattr(result_record, "check_step", record_check)
     run = rod(4e4, 0.0).simulate(0.2, method="rk4", step=0.05)
     assert run.success and not calls
     assert any("too long for the fastest motion" in text for text in run.warnings)

@@ -10,8 +10,8 @@ import pytest
 
 import mstmm
 from mstmm.runtime.integrate.steppers import IMPLICIT, get
-from tests.runtime.run.batch.test_batch_run import compiled
-from tests.runtime.run.test_checkpoint import interrupted
+from tests.runtime.run.batch.test_batch_run import rod_model
+from tests.runtime.run.test_checkpoint import interrupt_run
 from tests.support.implicit_methods import motions
 from tests.support.integration.compiled_systems import same_bits
 
@@ -26,7 +26,7 @@ def steps(method: str) -> dict[str, Any]:
 @pytest.mark.parametrize("method", IMPLICIT)
 def test_a_batch_has_the_bytes_of_single_runs(method: str, engine: str) -> None:
     """Of rods on which nothing does work: a single run watches its work, a batch does not."""
-    model = compiled("ball", engine)
+    model = rod_model("ball", engine)
     rng = np.random.default_rng(3)
     q, u = model.initial_state()
     q, u = np.tile(q, (5, 1)), u + rng.normal(size=(5, model.nu))
@@ -74,7 +74,7 @@ def test_a_run_resumed_from_a_file_has_the_bytes_of_a_whole_one(
     path, how = tmp_path / "run.npz", steps(method)
     whole = model.simulate(1.0, method, **how)
     with monkeypatch.context() as patch:
-        interrupted(patch, 0.4)
+        interrupt_run(patch, 0.4)
         cut = model.simulate(1.0, method, execution=mstmm.Execution(checkpoint=path), **how)
     assert cut.status is None and 0.4 < cut.t[-1] < 1.0
     rest = model.simulate(

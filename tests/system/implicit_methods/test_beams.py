@@ -10,7 +10,7 @@ import pytest
 
 import mstmm
 from mstmm.runtime.model.model import Model
-from tests.runtime.model.test_equilibrium_beams import elastica, tip, welded
+from tests.runtime.model.test_equilibrium_beams import elastica, tip, welded_beam_model
 from tests.support.implicit_methods import motions
 from tests.support.paths import EXAMPLES
 
@@ -70,7 +70,7 @@ def test_welded_beams_swing(method: str, how: dict[str, Any]) -> None:
 @pytest.mark.parametrize("method", ["rodas5p", "esdirk436", "kvaerno5"])
 def test_a_bent_beam_comes_to_rest_where_its_equilibrium_is(method: str, force: float) -> None:
     """In pseudo-time, with drag; Newton's method on the same tangent; and the exact elastica."""
-    model = welded(8, force, viscous_drag=10.0, damping=0.1)
+    model = welded_beam_model(8, force, viscous_drag=10.0, damping=0.1)
     rest = model.equilibrium()
     run = model.simulate(100.0, method, rtol=1e-4, atol=1e-7, output_times=[100.0])
     assert run.success, run.message

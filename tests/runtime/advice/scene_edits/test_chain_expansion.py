@@ -102,7 +102,7 @@ def test_a_chain_on_what_is_welded_to_the_ground_stays_one() -> None:
     assert np.abs(places(scene, NAMES[:2]) - places(found.scene, NAMES[:2])).max() < 1e-12
 
 
-def advised(scene: mstmm.Scene, error: float) -> mstmm.Advice:
+def checked_advice(scene: mstmm.Scene, error: float) -> mstmm.Advice:
     made = mstmm.advise(scene, 0.5, error=error, of=OF, rounds=0, budget=600)
     truth = tip(scene, 0.5, OF, method="rodas5p", rtol=1e-9, atol=1e-11)
     read = mstmm.Scene.from_data(tomllib.loads(made.scene.to_toml()))
@@ -113,7 +113,7 @@ def advised(scene: mstmm.Scene, error: float) -> mstmm.Advice:
 
 def test_stiff_members_become_rigid_and_one() -> None:
     """Stiff pins but for the first of every two: three rods of two."""
-    made = advised(rope(6, {}, {"law": {"stiffness": 1e6, "damping": 1e2}}), 1e-2)
+    made = checked_advice(rope(6, {}, {"law": {"stiffness": 1e6, "damping": 1e2}}), 1e-2)
     assert [body.name for body in made.scene.body] == ["rope_0", "rope_2", "rope_4"]
     assert made.reduced_name("rope[last].tip") == "rope_4.rope_5_tip"
     assert 'hinge "rope[3].hinge": rigid' in " ".join(made.other_changes)
@@ -121,14 +121,14 @@ def test_stiff_members_become_rigid_and_one() -> None:
 
 
 def test_dampers_of_a_chain_that_hardly_matter_go_together() -> None:
-    made = advised(rope(3, {"law": {"damping": 1e-9}}), 1e-3)
+    made = checked_advice(rope(3, {"law": {"damping": 1e-9}}), 1e-3)
     (chain,) = made.scene.chain
     assert chain.hinge[0].law.damping == (0.0,)
     assert 'chain "rope": without its damper' in " ".join(made.other_changes)
 
 
 def test_dampers_of_some_members() -> None:
-    made = advised(rope(4, {"law": {"damping": 1e-9}}, {"law": {"damping": 1.0}}), 1e-3)
+    made = checked_advice(rope(4, {"law": {"damping": 1e-9}}, {"law": {"damping": 1.0}}), 1e-3)
     assert made.scene.chain == ()
     kept = {hinge.name: hinge.law.damping for hinge in made.scene.hinge}
     assert kept == {
@@ -139,7 +139,7 @@ def test_dampers_of_some_members() -> None:
 
 def test_long_chains_stay_chains(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(chain_expansion, "MAX_MEMBERS", 2)
-    made = advised(rope(3, {"law": {"damping": 1e-9}}), 1e-3)
+    made = checked_advice(rope(3, {"law": {"damping": 1e-9}}), 1e-3)
     assert made.scene.chain[0].hinge[0].law.damping == (0.0,)
-    stiff = advised(rope(3, {}, {"law": {"stiffness": 1e6, "damping": 1e2}}), 1e-2)
+    stiff = checked_advice(rope(3, {}, {"law": {"stiffness": 1e6, "damping": 1e2}}), 1e-2)
     assert stiff.scene.chain[0].count == 3

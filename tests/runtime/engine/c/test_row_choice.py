@@ -95,7 +95,7 @@ def test_a_bricard_ring_turned_in_space_moves_as_it_stands(digits: int) -> None:
     """With its numbers rounded to so many digits, against the exact ring in line with the axes."""
     times = np.linspace(0.0, 3.0, 31)
     wanted = run(bricard(), output_times=times, rtol=1e-9)
-    scene = turned(bricard(), digits)
+    scene = rotate_scene(bricard(), digits)
     found = run(scene, output_times=times, rtol=1e-9)
     assert found.success
     assert np.abs(found.q - wanted.q).max() < 50 * 10.0**-digits + 1e-7
@@ -103,11 +103,11 @@ def test_a_bricard_ring_turned_in_space_moves_as_it_stands(digits: int) -> None:
     assert np.abs(energy - energy[0]).max() < 50 * (10.0**-digits + 1e-7)
 
 
-def turned(scene: dict[str, Any], digits: int) -> dict[str, Any]:
-    """The scene turned in space, all that hinges go by rounded."""
+def rotate_scene(scene: dict[str, Any], digits: int) -> dict[str, Any]:
+    """Rotate the scene in space and round the vectors that its hinges depend on."""
     turn = orientation(OBLIQUE)
 
-    def told(x: Any) -> list[float]:
+    def rounded_vector(x: Any) -> list[float]:
         return [round(float(number), digits) for number in turn @ np.array(x, float)]
 
     scene["gravity"] = [float(x) for x in turn @ np.array(scene["gravity"], float)]
@@ -115,11 +115,11 @@ def turned(scene: dict[str, Any], digits: int) -> dict[str, Any]:
         inertia = turn @ np.diag(body["inertia"]) @ turn.T
         body["inertia"] = [float(inertia[pair]) for pair in PAIRS]
         body["center_of_mass"] = [float(x) for x in turn @ np.array(body["center_of_mass"])]
-        body["ends"] = {name: told(end) for name, end in body["ends"].items()}
+        body["ends"] = {name: rounded_vector(end) for name, end in body["ends"].items()}
     for hinge in scene["hinge"]:
-        hinge["axis"] = told(hinge["axis"])
+        hinge["axis"] = rounded_vector(hinge["axis"])
         if "position" in hinge:
-            hinge["position"] = told(hinge["position"])
+            hinge["position"] = rounded_vector(hinge["position"])
     return scene
 
 

@@ -8,7 +8,7 @@ import mstmm
 from tests.system.loops.test_flexible_against_tree import slider_crank
 
 
-def behind(mass: float, cut: str) -> mstmm.Model:
+def heavy_slider_model(mass: float, cut: str) -> mstmm.Model:
     """The slider-crank with a slider of so many kg; with `guide` cut it hangs behind the rod."""
     scene = slider_crank(cut)
     scene["body"][1] |= {"mass": mass, "inertia": [1e-3 * mass] * 3}
@@ -24,7 +24,10 @@ def accelerations(model: mstmm.Model) -> dict[str, float]:
 
 @pytest.mark.parametrize(("mass", "least"), [(1e4, 1e-11), (1e8, 1e-7), (1e10, 1e-5)])
 def test_it_loses_no_digits(mass: float, least: float) -> None:
-    hanging, exact = behind(mass, "guide"), accelerations(behind(mass, "wrist"))
+    hanging, exact = (
+        heavy_slider_model(mass, "guide"),
+        accelerations(heavy_slider_model(mass, "wrist")),
+    )
     assert accelerations(hanging).keys() == exact.keys()
 
     def error() -> float:

@@ -30,7 +30,7 @@ def driven(**drives: str) -> Scene:
     return scene
 
 
-def held(*names: str, off: float = 0.0) -> Scene:
+def hold_hinges(*names: str, off: float = 0.0) -> Scene:
     scene = four_bar()
     for name in names:
         hinge(scene, name)["hold"] = True
@@ -73,11 +73,11 @@ REFUSED = {
         r'with "foot" fixed.*drive fewer',
     ),
     "more held than is free": (
-        held("foot", "end", off=0.2),
+        hold_hinges("foot", "end", off=0.2),
         r'with "foot", "end" fixed.*fix or drive fewer.*; hold fixes 2 '
         r"coordinates, the mechanism has 1 degree of freedom$",
     ),
-    "one held out of reach": (held("end", off=-1.3), r'with "end" fixed; [^;]*$'),
+    "one held out of reach": (hold_hinges("end", off=-1.3), r'with "end" fixed; [^;]*$'),
     "speeds at odds": (fast(foot=1.0, end=5.0), r'speeds given for "foot", "end" are inconsistent'),
     "an axis off by a hundredth": (
         four_bar(end={"axis": [math.sin(0.01), 0, math.cos(0.01)]}),
@@ -130,7 +130,7 @@ def test_one_drive_too_many_of_a_chain_of_windows() -> None:
 def test_what_agrees_is_taken() -> None:
     """As many drives and holds as one likes, where they say the same."""
     assert compile_scene(driven(foot="0.9", end=f"{REST!r}")).simulate(0.1).success
-    assert compile_scene(held("foot", "knee", "tip", "end")).loops.mobility == 1
+    assert compile_scene(hold_hinges("foot", "knee", "tip", "end")).loops.mobility == 1
 
 
 @pytest.mark.parametrize("misfit", [0.0, 1e-7, 1e-5, 1e-4, 3e-4])

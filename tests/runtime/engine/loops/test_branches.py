@@ -71,14 +71,14 @@ def linkage(starts: dict[str, float], cut: str = "heel", dyads: int = 1) -> dict
     return {"gravity": [0, 0, 0], "body": bodies, "hinge": hinges}
 
 
-def wrapped(angle: Array | float) -> Any:
+def wrap_angle(angle: Array | float) -> Any:
     return (np.asarray(angle) + np.pi) % (2 * np.pi) - np.pi
 
 
 def off(model: mstmm.Model, q: Array, wanted: dict[str, float]) -> float:
     """The largest angle by which a state is not as wanted."""
     slots = model.coordinate_layout.hinges
-    return max(abs(float(wrapped(q[slots[name].q] - angle))) for name, angle in wanted.items())
+    return max(abs(float(wrap_angle(q[slots[name].q] - angle))) for name, angle in wanted.items())
 
 
 @pytest.mark.parametrize("crank", [-3.0, 0.4, 2.0])
@@ -112,7 +112,7 @@ def test_a_crank_takes_the_nearest_branch_at_every_angle(side: int, cut: str) ->
         starts = {name: wish[name] + draw.uniform(-0.3, 0.3) for name in ("knee", "heel")}
         for names in (("knee", "heel"), ("heel",)):
             given = {name: starts[name] for name in names} | {"foot": float(crank)}
-            far = [sum(float(wrapped(one[n] - given[n])) ** 2 for n in names) for one in both]
+            far = [sum(float(wrap_angle(one[n] - given[n])) ** 2 for n in names) for one in both]
             model = mstmm.compile(mstmm.Scene(**linkage(given, cut)))
             nearest = both[int(np.argmin(far))]
             assert off(model, model.initial_state()[0], nearest) < 1e-9

@@ -10,8 +10,8 @@ import mstmm
 from mstmm.errors import SceneError
 
 
-def held(kind: str, modes: dict[str, int]) -> mstmm.Model:
-    """By a hinge at either end, on the ground."""
+def supported_beam_model(kind: str, modes: dict[str, int]) -> mstmm.Model:
+    """Model of a beam on the ground, supported by a hinge at either end."""
     beam: dict[str, Any] = {
         "name": "b", "length": 1.0, "mass_per_length": 1.0, "bending_stiffness": 1.0,
         "axial_stiffness": 1e4, "modes": modes,
@@ -27,7 +27,7 @@ def held(kind: str, modes: dict[str, int]) -> mstmm.Model:
 @pytest.mark.parametrize("count", [4, 8, 12])
 def test_one_that_stretches_bends(kind: str, rows: int, count: int) -> None:
     """However many shapes there are; the angle of the hinge that is cut goes far with many."""
-    loops = held(kind, {"y": count, "axial": 3}).loops
+    loops = supported_beam_model(kind, {"y": count, "axial": 3}).loops
     hinges = 0 if kind == "fixed" else 1
     assert (loops.rank, loops.mobility) == (rows, count + 3 + hinges - rows)
     assert not loops.singular
@@ -37,4 +37,4 @@ def test_one_that_stretches_bends(kind: str, rows: int, count: int) -> None:
 @pytest.mark.parametrize("count", [4, 8])
 def test_one_that_does_not_is_refused(kind: str, count: int) -> None:
     with pytest.raises(SceneError, match=r'"far" in an isolated configuration.*axial shapes'):
-        held(kind, {"y": count})
+        supported_beam_model(kind, {"y": count})

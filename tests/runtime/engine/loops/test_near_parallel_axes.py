@@ -16,13 +16,13 @@ from tests.support.scenes.linkages import COUPLER, CRANK, OBLIQUE, four_bar, rod
 NAMES = ("foot", "knee", "tip", "end")
 
 
-def refused(scene: dict[str, Any]) -> str:
+def refusal_message(scene: dict[str, Any]) -> str:
     with pytest.raises(mstmm.SceneError) as caught:
         mstmm.compile(mstmm.Scene(**scene))
     return str(caught.value)
 
 
-def changed(name: str, **keys: Any) -> dict[str, Any]:
+def hinge_changes(name: str, **keys: Any) -> dict[str, Any]:
     return {name: keys}
 
 
@@ -35,7 +35,7 @@ def off(tilt: float) -> str:
 def test_a_tilted_axis_is_named(name: str, tilt: float) -> None:
     axis = [math.sin(tilt), 0.0, math.cos(tilt)]
     before, behind = (NAMES[(NAMES.index(name) + k) % 4] for k in (-1, 1))
-    told = refused(four_bar(tilt=OBLIQUE, **changed(name, axis=axis)))
+    told = refusal_message(four_bar(tilt=OBLIQUE, **hinge_changes(name, axis=axis)))
     assert f'; the axis of hinge "{name}" is {off(tilt)} from parallel to those of ' in told
     assert f'"{before}" and "{behind}"' in told or f'"{behind}" and "{before}"' in told
     assert told.endswith("; make it parallel by an exact axis and orientation, or replace it "
@@ -52,7 +52,7 @@ def test_a_tilted_axis_is_named(name: str, tilt: float) -> None:
     ],
 )
 def test_what_the_tilt_does_comes_first(tilt: float, found: str) -> None:
-    told = refused(four_bar(end={"axis": [math.sin(tilt), 0, math.cos(tilt)]}))
+    told = refusal_message(four_bar(end={"axis": [math.sin(tilt), 0, math.cos(tilt)]}))
     assert found in told and f'; the axis of hinge "end" is {off(tilt)} from parallel' in told
 
 
@@ -66,14 +66,14 @@ def test_a_run_that_locks_names_the_axis(tilt: float) -> None:
 
 
 def test_speeds_that_a_tilted_axis_does_not_allow() -> None:
-    told = refused(four_bar(speed=1.0, knee={"axis": [math.sin(2e-3), 0, math.cos(2e-3)]}))
+    told = refusal_message(four_bar(speed=1.0, knee={"axis": [math.sin(2e-3), 0, math.cos(2e-3)]}))
     assert "are inconsistent by" in told
     assert f'; the axis of hinge "knee" is {off(2e-3)} from parallel' in told
 
 
 @pytest.mark.parametrize("cut", NAMES)
 def test_the_cut_makes_no_difference(cut: str) -> None:
-    told = refused(four_bar(cut=cut, knee={"axis": [math.sin(0.02), 0, math.cos(0.02)]}))
+    told = refusal_message(four_bar(cut=cut, knee={"axis": [math.sin(0.02), 0, math.cos(0.02)]}))
     assert f'; the axis of hinge "knee" is {off(0.02)} from parallel' in told
 
 
@@ -83,7 +83,7 @@ def test_the_cut_makes_no_difference(cut: str) -> None:
 )
 def test_an_orientation_tilts_one_end(name: str, pair: tuple[str, str, str]) -> None:
     """Of two axes on one body nothing says which is meant."""
-    told = refused(four_bar(**changed(name, orientation=[0.0, 0.01, 0.0])))
+    told = refusal_message(four_bar(**hinge_changes(name, orientation=[0.0, 0.01, 0.0])))
     assert re.search(f'; the axes of hinges "({pair[0]}|{pair[1]})" and "({pair[0]}|{pair[1]})" on '
                      f"{pair[2]} are {re.escape(off(0.01))} from parallel; make", told)  # fmt: skip
 
@@ -91,7 +91,7 @@ def test_an_orientation_tilts_one_end(name: str, pair: tuple[str, str, str]) -> 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_way_out(name: str) -> None:
     """A ball in place of the hinge that is off leaves one freedom and no gap."""
-    scene = four_bar(**changed(name, orientation=[0.0, 0.01, 0.0], type="ball"))
+    scene = four_bar(**hinge_changes(name, orientation=[0.0, 0.01, 0.0], type="ball"))
     for hinge in scene["hinge"]:
         if hinge["name"] == name:
             hinge.pop("initial")
@@ -119,7 +119,7 @@ def slider_crank(rail: dict[str, Any], top: str = "pin") -> dict[str, Any]:
 
 def test_a_rail_that_leaves_the_plane() -> None:
     axis = [math.cos(0.02), 0.0, math.sin(0.02)]
-    told = refused(slider_crank({"axis": axis}))
+    told = refusal_message(slider_crank({"axis": axis}))
     assert f'; the axis of hinge "rail" is {off(0.02)} out of the plane in which the pins' in told
     loops = mstmm.compile(mstmm.Scene(**slider_crank({"axis": axis}, "cylindrical"))).loops
     assert loops.mobility == 1
@@ -127,7 +127,7 @@ def test_a_rail_that_leaves_the_plane() -> None:
 
 def test_a_rail_that_turns_the_slider() -> None:
     """It joins two pins whose axes it keeps from being parallel."""
-    told = refused(slider_crank({"orientation": [0.02, 0.0, 0.0]}))
+    told = refusal_message(slider_crank({"orientation": [0.02, 0.0, 0.0]}))
     assert re.search(r'; the axes of hinges "(top|foot)" and "(top|foot)" .* are 0\.02 rad', told)
 
 
@@ -135,15 +135,15 @@ def test_what_angles_do_not_explain() -> None:
     """Feet too far apart, an axis that is a little off, and one that is meant to be oblique."""
     scene = four_bar(end={"axis": [math.sin(1e-3), 0, math.cos(1e-3)]})
     scene["hinge"][3]["position"] = [4.0, 0, 0]
-    assert refused(scene).endswith("or axes, or start closer to a closed configuration")
-    told = refused(four_bar(end={"axis": [math.sin(0.3), 0, math.cos(0.3)]}))
+    assert refusal_message(scene).endswith("or axes, or start closer to a closed configuration")
+    told = refusal_message(four_bar(end={"axis": [math.sin(0.3), 0, math.cos(0.3)]}))
     assert "from parallel" not in told
 
 
 def test_a_loop_in_which_nothing_is_off_is_told_by_its_lengths() -> None:
     scene = four_bar(tilt=OBLIQUE)
     scene["hinge"][3]["position"] = [float(x) for x in 3 * np.array(scene["hinge"][3]["position"])]
-    assert "from parallel" not in refused(scene)
+    assert "from parallel" not in refusal_message(scene)
 
 
 def test_a_bar_that_is_too_long_is_not_put_down_to_an_axis() -> None:
@@ -151,7 +151,7 @@ def test_a_bar_that_is_too_long_is_not_put_down_to_an_axis() -> None:
     scene = four_bar(end={"axis": [math.sin(0.02), 0, math.cos(0.02)]})
     for body in scene["body"]:
         body["ends"]["tip"] = [4.0 if body["name"] == "coupler" else body["ends"]["tip"][0], 0, 0]
-    told = refused(scene)
+    told = refusal_message(scene)
     assert "correct lengths" in told and "parallel" not in told
 
 
@@ -167,7 +167,9 @@ def test_three_pins_are_a_structure_however_parallel() -> None:
     ]  # fmt: skip
     for hinge in hinges[1:2]:
         del hinge["position"]
-    assert "parallel" not in refused({"gravity": [0, -9.81, 0], "body": bars, "hinge": hinges})
+    assert "parallel" not in refusal_message(
+        {"gravity": [0, -9.81, 0], "body": bars, "hinge": hinges}
+    )
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from mstmm.runtime.engine.statics.static_equilibrium import (
 Array = NDArray[np.float64]
 
 
-def moved(q: Array, step: Array) -> Array:
+def add_step(q: Array, step: Array) -> Array:
     return q + step
 
 
@@ -30,7 +30,7 @@ def spiral(q: Array) -> Array:
 
 def test_a_load_that_is_too_much_at_once_is_applied_in_parts() -> None:
     found = find_determined_equilibrium(
-        EquilibriumProblem(spiral, moved, np.ones(2)), np.zeros(2), 1e-10
+        EquilibriumProblem(spiral, add_step, np.ones(2)), np.zeros(2), 1e-10
     )
     assert np.abs(spiral(found)).max() < 1e-12
 
@@ -40,24 +40,24 @@ def test_units_do_not_matter() -> None:
     units = np.array([1e-6, 1e6])
     stiffness = np.array([[2.0, -1.0], [-1.0, 3.0]])
 
-    def needed(q: Array) -> Array:
+    def required_efforts(q: Array) -> Array:
         x = q / units
         return np.asarray((stiffness @ (x + x**3) - [1.0, 2.0]) / units)
 
     found = find_determined_equilibrium(
-        EquilibriumProblem(needed, moved, units), np.zeros(2), 1e-10
+        EquilibriumProblem(required_efforts, add_step, units), np.zeros(2), 1e-10
     )
-    assert np.abs(needed(found) * units).max() < 1e-12
+    assert np.abs(required_efforts(found) * units).max() < 1e-12
 
 
 def test_a_state_that_does_not_exist_is_not_stepped_into() -> None:
-    def needed(q: Array) -> Array:
+    def required_efforts(q: Array) -> Array:
         if q[0] > 0.4:
             raise NumericalFailure("beyond the end")
         return np.array([np.tan(3.9 * q[0]) - 8.0])
 
     found = find_determined_equilibrium(
-        EquilibriumProblem(needed, moved, np.ones(1)), np.zeros(1), 1e-10
+        EquilibriumProblem(required_efforts, add_step, np.ones(1)), np.zeros(1), 1e-10
     )
     assert found[0] == pytest.approx(np.arctan(8.0) / 3.9, abs=1e-10)
 
@@ -65,14 +65,16 @@ def test_a_state_that_does_not_exist_is_not_stepped_into() -> None:
 def test_a_stiffness_of_rounding_is_undetermined_and_a_small_one_is_not() -> None:
     """A spring of 0.01 behind one of 1000, and a sum of squares that is one."""
 
-    def needed(q: Array) -> Array:
+    def required_efforts(q: Array) -> Array:
         turned = np.sin(q[0] + q[1])
         loose = np.sin(q[2] + 1.0) ** 2 + np.cos(q[2] + 1.0) ** 2 - 1.0
         return np.array([1e3 * turned + 1e-2 * q[0], 1e3 * turned, loose])
 
     with pytest.raises(UndeterminedEquilibriumError) as caught:
         find_determined_equilibrium(
-            EquilibriumProblem(needed, moved, np.ones(3)), np.array([0.1, 0.2, 0.0]), 1e-8
+            EquilibriumProblem(required_efforts, add_step, np.ones(3)),
+            np.array([0.1, 0.2, 0.0]),
+            1e-8,
         )
     assert caught.value.coordinate_indices == (2,)
 
@@ -81,7 +83,9 @@ def test_a_stiffness_of_rounding_is_undetermined_and_a_small_one_is_not() -> Non
 def test_efforts_that_nothing_balances_are_left(value: float) -> None:
     with pytest.raises((EquilibriumNotFoundError, NumericalFailure)):
         find_determined_equilibrium(
-            EquilibriumProblem(lambda _: np.array([value]), moved, np.ones(1)), np.zeros(1), 1e-10
+            EquilibriumProblem(lambda _: np.array([value]), add_step, np.ones(1)),
+            np.zeros(1),
+            1e-10,
         )
 
 
@@ -90,14 +94,14 @@ def test_a_slack_valley_is_followed_to_its_bottom() -> None:
     at all."""
     calls = []
 
-    def needed(q: Array) -> Array:
+    def required_efforts(q: Array) -> Array:
         calls.append(q)
         across, along = q[0] + q[1], q[0] - q[1]
         force = 1e-8 * along + 3 * along**3
         return np.array([across + force, across - force])
 
     found = find_determined_equilibrium(
-        EquilibriumProblem(needed, moved, np.ones(2)), np.array([2e-4, 1e-4]), 1e-10
+        EquilibriumProblem(required_efforts, add_step, np.ones(2)), np.array([2e-4, 1e-4]), 1e-10
     )
     assert np.abs(found).max() < 1e-9
     assert len(calls) < 150

@@ -75,11 +75,11 @@ def test_no_kernel_is_evaluated_for_pairs(monkeypatch: pytest.MonkeyPatch) -> No
     evaluated: list[int] = []
     evaluate = beam_kernels.evaluate
 
-    def counted(name: str, inputs: Mapping[str, Array]) -> dict[str, Array]:
+    def evaluate_and_record(name: str, inputs: Mapping[str, Array]) -> dict[str, Array]:
         evaluated.append(max(array.size for array in inputs.values()))
         return evaluate(name, inputs)
 
-    monkeypatch.setattr(beam_kernels, "evaluate", counted)
+    monkeypatch.setattr(beam_kernels, "evaluate", evaluate_and_record)
     body(modes={"y": 2})  # the terms of the kernels
     totals = []
     for count in (15, 30, 60):

@@ -18,7 +18,7 @@ from tests.support.scenes.single_beam import FREE, HELD, PIN, body_of
 PIECES = [(0.0, 0.3, 1.0, 1.0), (0.3, 0.8, 4.0, 0.25), (0.8, 1.1, 0.5, 2.0)]  # from, to, EI, m
 
 
-def stepped(**more: Any) -> dict[str, Any]:
+def stepped_beam_keys(**more: Any) -> dict[str, Any]:
     section = [
         {"from": a, "to": b, "bending_stiffness": ei, "mass_per_length": m,
          "torsional_stiffness": ei / 2, "axial_stiffness": 9 * ei}
@@ -46,8 +46,8 @@ def deflection(body: ModalBody, force_at: str, at: str, row: int = 1) -> float:
 
 
 def test_static_shapes_carry_end_forces_exactly() -> None:
-    body = body_of(HELD, **stepped(modes={"y": 4}, basis="static+fixed-interface",
-                                   ends={"mid": 0.55}, frame="tangent"),
+    body = body_of(HELD, **stepped_beam_keys(modes={"y": 4}, basis="static+fixed-interface",
+                                             ends={"mid": 0.55}, frame="tangent"),
                    more={"load": [{"on": "b.mid", "force": [0, 1, 0]},
                                   {"on": "b.tip", "force": [0, 1, 0]}]})  # fmt: skip
     for force_at, x in (("mid", 0.55), ("tip", 1.1)):
@@ -57,8 +57,8 @@ def test_static_shapes_carry_end_forces_exactly() -> None:
 
 
 def test_static_shapes_are_unit_displacements_of_their_interface() -> None:
-    body = body_of(HELD, **stepped(modes={"y": 6}, basis="static+fixed-interface",
-                                   ends={"mid": 0.55}),
+    body = body_of(HELD, **stepped_beam_keys(modes={"y": 6}, basis="static+fixed-interface",
+                                             ends={"mid": 0.55}),
                    more={"load": [{"on": "b.mid", "force": [0, 1, 0]},
                                   {"on": "b.tip", "force": [0, 1, 0]}]})  # fmt: skip
     mid, tip = body.ports["mid"], body.ports["tip"]
@@ -70,7 +70,9 @@ def test_static_shapes_are_unit_displacements_of_their_interface() -> None:
 @pytest.mark.parametrize(("key", "row"), [("twist", 3), ("axial", 0)])
 def test_static_twist_and_stretch_are_exact(key: str, row: int) -> None:
     more = {"polar_inertia_per_length": 0.1} if key == "twist" else {}
-    body = body_of(HELD, **stepped(modes={key: 2}, basis="static+fixed-interface", **more))
+    body = body_of(
+        HELD, **stepped_beam_keys(modes={key: 2}, basis="static+fixed-interface", **more)
+    )
     factor = {"twist": 2.0, "axial": 1 / 9}[key]
     tip = body.ports["tip"]
     seen = tip.theta[0] if key == "twist" else tip.phi[0]
@@ -80,7 +82,7 @@ def test_static_twist_and_stretch_are_exact(key: str, row: int) -> None:
 
 @pytest.mark.parametrize("basis", ["clamped-free", "static+fixed-interface"])
 def test_a_stepped_beam_vibrates_like_its_pieces_welded(basis: str) -> None:
-    whole = body_of(HELD, **stepped(modes={"y": 6}, basis=basis, frame="tangent"))
+    whole = body_of(HELD, **stepped_beam_keys(modes={"y": 6}, basis=basis, frame="tangent"))
     parts = [
         body_of(HELD, length=b - a, bending_stiffness=ei, mass_per_length=m, modes={"y": 6},
                 basis="static+fixed-interface", polar_inertia_per_length=1e-9)

@@ -150,12 +150,12 @@ def test_meshes_are_factorised_sparsely_and_no_oftener_than_held(
     """A plate whose unknowns are taken as they come fills six times more than the matrix holds."""
     fills, known = [], scipy.sparse.linalg.splu
 
-    def counted(matrix: Any, *given: Any, **how: Any) -> Any:
+    def factorise_and_record(matrix: Any, *given: Any, **how: Any) -> Any:
         found = known(matrix, *given, **how)
         fills.append((found.L.nnz + found.U.nnz) / matrix.nnz)
         return found
 
-    monkeypatch.setattr(scipy.sparse.linalg, "splu", counted)
+    monkeypatch.setattr(scipy.sparse.linalg, "splu", factorise_and_record)
     box = {"size": [1.0, 0.05, 0.4], "divisions": [8, 1, 16]}
     bar.body(bar.table(box=box, modes=2))
     assert len(fills) == 2 and max(fills) < 3  # with both its sections held, then with one

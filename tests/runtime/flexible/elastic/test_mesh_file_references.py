@@ -25,7 +25,7 @@ def folders(tmp_path: Path) -> tuple[Path, Path]:
     return found
 
 
-def refused(path: Path) -> None:
+def check_refusal(path: Path) -> None:
     with pytest.raises(SceneError, match="not in its own folder; put that file next to the mesh"):
         read_mesh(path, "body")
 
@@ -36,15 +36,15 @@ def test_abaqus(folders: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch) -> 
     mesh = folder / "mesh.inp"
     for name in ("../outside/part.inp", str(outside / "part.inp")):
         mesh.write_text(f"*Include, input={name}\n")
-        refused(mesh)
+        check_refusal(mesh)
     meshio.write(folder / "part.inp", MESH)
     mesh.write_text("*INCLUDE, INPUT=part.inp\n")
     assert read_mesh(mesh, "body").nelements == 1
     monkeypatch.chdir(outside)  # where meshio would find another file of that name
-    refused(mesh)
+    check_refusal(mesh)
     mesh.write_text("*INCLUDE, INPUT=inner.inp\n")
     (folder / "inner.inp").write_text("*INCLUDE, INPUT=../outside/part.inp\n")
-    refused(mesh)
+    check_refusal(mesh)
     for again in ("mesh.inp", "inner.inp"):
         (folder / "inner.inp").write_text(f"*INCLUDE, INPUT={again}\n")
         with pytest.raises(SceneError, match="includes itself"):
@@ -61,7 +61,7 @@ def test_xdmf(folders: tuple[Path, Path], form: str, monkeypatch: pytest.MonkeyP
     for name in ("mesh.h5", "mesh0.bin"):
         text = text.replace(name, f"../outside/{name}")
     (folder / "mesh.xdmf").write_text(text)
-    refused(folder / "mesh.xdmf")
+    check_refusal(folder / "mesh.xdmf")
 
 
 def test_hdf5(folders: tuple[Path, Path]) -> None:
@@ -77,4 +77,4 @@ def test_hdf5(folders: tuple[Path, Path]) -> None:
                     layout = h5py.VirtualLayout(data.shape, data.dtype)
                     layout[...] = h5py.VirtualSource(outside / "mesh.h5", name, data.shape)
                     false.create_virtual_dataset(name, layout)
-        refused(folder / "mesh.xdmf")
+        check_refusal(folder / "mesh.xdmf")

@@ -60,7 +60,7 @@ def test_the_axes_of_the_held_end_turn_what_its_hinge_leaves_free() -> None:
     assert np.diag(one) == pytest.approx(np.diag(other), rel=1e-6)
 
 
-def deflected(body: ModalBody, **wrenches: Any) -> np.ndarray:
+def modal_deflection(body: ModalBody, **wrenches: Any) -> np.ndarray:
     """Modal coordinates under wrenches (force, moment) on ends, the frame's motion free."""
     load = sum(
         np.concatenate([body.ports[end].phi, body.ports[end].theta]).T @ np.asarray(wrench, float)
@@ -80,9 +80,9 @@ def test_loaded_ends_of_a_free_bar_stretch_twist_and_bend_it(acts: str) -> None:
     law = {"law": {"stiffness": 6 * [1.0]}} if acts == "law" else {}
     body = elastic_bodies(bar({"type": "free"} | law, **more))["e"]
     tip, root = body.ports["tip"], body.ports["root"]
-    pulled = deflected(body, tip=[1, 0, 0, 0, 0, 0], root=[-1, 0, 0, 0, 0, 0])
+    pulled = modal_deflection(body, tip=[1, 0, 0, 0, 0, 0], root=[-1, 0, 0, 0, 0, 0])
     assert (tip.phi - root.phi)[0] @ pulled == pytest.approx(LENGTH / (YOUNG * SIDE**2), rel=1e-6)
-    bent = deflected(body, tip=[0, 0, 0, 0, 0, 1], root=[0, 0, 0, 0, 0, -1])
+    bent = modal_deflection(body, tip=[0, 0, 0, 0, 0, 1], root=[0, 0, 0, 0, 0, -1])
     curved = LENGTH / (YOUNG * SIDE**4 / 12)
     assert (tip.theta - root.theta)[2] @ bent == pytest.approx(curved, rel=1e-3)
 

@@ -24,7 +24,7 @@ def rotation(
     return problem
 
 
-def fired(run: Integrator) -> tuple[list[int], Any]:
+def event_samples(run: Integrator) -> tuple[list[int], Any]:
     """Events and times of the samples just after a change."""
     after = run.samples.event > 0
     return list(run.samples.event[after] - 1), run.samples.t[after]
@@ -35,7 +35,7 @@ def test_event_times_are_exact_to_the_tolerance_of_the_run(lab: Lab, method: str
     problem = rotation(lab, RESTART, y1=0.5)
     run = problem.solved(method, 20.0, (1, 0), rtol=1e-13, atol=1e-14)
     exact = [(2 * k + 1) * math.pi + math.asin(0.5) for k in range(3)]
-    numbers, times = fired(run)
+    numbers, times = event_samples(run)
     assert numbers == [0, 0, 0]
     assert times == pytest.approx(exact, abs=1e-12)
 
@@ -161,7 +161,7 @@ def test_a_short_true_interval_within_a_step_is_found(lab: Lab) -> None:
     problem = rotation(lab, RESTART, y0=1 - 1e-4)
     run = problem.solved("dop853", 63.0, (0, -1), t_start=math.pi / 2, rtol=1e-12, atol=1e-12)
     exact = 2 * math.pi * np.arange(1, 11) - math.acos(1 - 1e-4)
-    assert fired(run)[1] == pytest.approx(exact, abs=1e-8)
+    assert event_samples(run)[1] == pytest.approx(exact, abs=1e-8)
 
 
 def test_a_clock_event_at_a_break_fires_exactly_there(lab: Lab) -> None:

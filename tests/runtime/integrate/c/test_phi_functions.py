@@ -26,7 +26,7 @@ class Moved:
     phi: Any
     n: int
 
-    def _filled(self, name: str, argument: float) -> Array:
+    def _evaluate(self, name: str, argument: float) -> Array:
         found = np.zeros(self.n)
         call = getattr(self.lib, f"mstmm_phi_{name}")
         call(self.phi, argument, self.ffi.from_buffer("double[]", found))
@@ -34,11 +34,11 @@ class Moved:
 
     def part(self, k: int) -> Array:
         """phi_(k+1)(X) c_k."""
-        return self._filled("part", k)
+        return self._evaluate("part", k)
 
-    def at(self, theta: float) -> Array:
+    def value_at(self, theta: float) -> Array:
         """w(theta)."""
-        return self._filled("at", theta)
+        return self._evaluate("at", theta)
 
 
 class Library:
@@ -52,17 +52,17 @@ class Library:
         self.lib: Any = self.ffi.dlopen(str(target))
         self.kept: list[Any] = []
 
-    def prepared(self, X: Array, h: float = 1.0) -> tuple[Any, int]:
-        """The functions of h X, and what the C says of it."""
+    def prepare_functions(self, X: Array, h: float = 1.0) -> tuple[Any, int]:
+        """Phi functions of h X, and the status code of the C."""
         n = len(X)
         numbers = self.ffi.from_buffer("double[]", np.zeros(self.lib.mstmm_phi_size(n)))
         phi = self.ffi.new("mstmm_phi *", self.lib.mstmm_phi_lay(n, numbers))
         self.kept.append(numbers)
         return phi, self.lib.mstmm_phi_prepare(phi, h, self.pointer(X))
 
-    def moved(self, X: Array, c: Array) -> Moved:
-        """c (3, n)."""
-        phi, code = self.prepared(X)
+    def forced_motion(self, X: Array, c: Array) -> Moved:
+        """Motion from rest under the polynomial of the coefficients c (3, n)."""
+        phi, code = self.prepare_functions(X)
         assert code == 0
         for k in range(3):
             self.lib.mstmm_phi_force(phi, k, self.pointer(c[k]))
@@ -128,7 +128,7 @@ def test_phi_times_vectors(phi: Library, name: str, rng: Generator) -> None:
     """To 1e-13 of what a vector that nothing turns would be, in the units of the matrix."""
     X, unit = cases(rng)[name]
     c = unit * rng.normal(size=(3, len(X)))
-    moved = phi.moved(X, c)
+    moved = phi.forced_motion(X, c)
     for k in range(3):
         expected = part_exact(X, c, k)
         size = max(np.abs(c[k] / unit).max(), np.abs(expected / unit).max())
@@ -140,24 +140,24 @@ def test_the_way_there(phi: Library, name: str, rng: Generator) -> None:
     """Earlier on the way, near both ends too, and where it ends."""
     X, unit = cases(rng)[name]
     c = unit * rng.normal(size=(3, len(X)))
-    moved = phi.moved(X, c)
+    moved = phi.forced_motion(X, c)
     for theta in (0.0, 1e-9, 0.3777, 0.5, 1 - 2**-30):
         expected = exact(X, c, theta)
         size = max(np.abs(c / unit).max(), np.abs(expected / unit).max())
-        assert np.abs((moved.at(theta) - expected) / unit).max() < 1e-13 * size, theta
+        assert np.abs((moved.value_at(theta) - expected) / unit).max() < 1e-13 * size, theta
     whole = sum(moved.part(k) for k in range(3))
     size = max(np.abs(c / unit).max(), np.abs(whole / unit).max())
-    assert np.abs((moved.at(1.0) - whole) / unit).max() < 1e-13 * size
+    assert np.abs((moved.value_at(1.0) - whole) / unit).max() < 1e-13 * size
 
 
 def test_slow_motion_keeps_its_digits_beside_fast_one(phi: Library) -> None:
     X = np.diag([-1e6, -1.0, 1e-3])
-    moved = phi.moved(X, np.ones((3, 3)))
+    moved = phi.forced_motion(X, np.ones((3, 3)))
     expected = -np.expm1(np.diag(X)) / -np.diag(X)
     assert moved.part(0) == pytest.approx(expected, rel=4e-16)
 
 
 @pytest.mark.parametrize("size", [np.nan, np.inf, 1e300])
 def test_what_leaves_nothing_but_rounding_is_refused(phi: Library, size: float) -> None:
-    _, code = phi.prepared(np.array([[0.0, 1.0], [-1.0, 0.0]]), size)
+    _, code = phi.prepare_functions(np.array([[0.0, 1.0], [-1.0, 0.0]]), size)
     assert code == 1

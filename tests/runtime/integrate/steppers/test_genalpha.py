@@ -35,7 +35,7 @@ def pendulum() -> mstmm.Scene:
     return mstmm.Scene(gravity=[0, -GRAVITY, 0], body=[rod], hinge=[plane, pin])
 
 
-def printed(radius: float, h: float, steps: int) -> tuple[Array, Array, Array]:
+def reference_motion(radius: float, h: float, steps: int) -> tuple[Array, Array, Array]:
     """q, u (steps + 1, 3) and multipliers (steps, 2) of equations (12), (18) to (21) of M. Arnold,
     O. Brüls, Multibody System Dynamics 18 (2007) 185-202, on M q'' + Phi_q^T lambda = f, Phi = 0,
     by a full Newton matrix; auxiliary accelerations begin with q''."""
@@ -82,7 +82,7 @@ def swung() -> mstmm.Model:
 @pytest.mark.parametrize("radius", [0.0, 0.6, 0.9])
 def test_printed_equations(radius: float, swung: mstmm.Model) -> None:
     h, steps = 0.02, 60
-    q, u, _ = printed(radius, h, steps)
+    q, u, _ = reference_motion(radius, h, steps)
     result = swung.simulate(
         h * steps,
         mstmm.methods.GeneralizedAlpha("genalpha-index3", radius=radius),
@@ -109,7 +109,7 @@ def test_multipliers_are_of_second_order(swung: mstmm.Model) -> None:
         run = swung.simulate(
             end, "genalpha-index3", step=end / steps, rtol=1e-11, output_times=[0.0, end]
         )
-        lam = printed(0.8, end / steps, steps)[2][-1]
+        lam = reference_motion(0.8, end / steps, steps)[2][-1]
         errors.append([
             np.abs(run.force("pin")[-1] - wanted).max(), np.abs(-lam - wanted[:2]).max()
         ])  # fmt: skip

@@ -55,12 +55,12 @@ class Stages:
     def __init__(self, a: NDArray[np.float64]) -> None:
         self.a, self.known = a, dict[Tree, NDArray[np.float64]]()
 
-    def of(self, tree: Tree) -> NDArray[np.float64]:
+    def elementary_weights(self, tree: Tree) -> NDArray[np.float64]:
         """Phi_i(t) without the root's weight: the product over the branches of A Phi."""
         if tree not in self.known:
             product = np.ones(len(self.a))
             for branch in tree:
-                product = product * (self.a @ self.of(branch))
+                product = product * (self.a @ self.elementary_weights(branch))
             self.known[tree] = product
         return self.known[tree]
 
@@ -68,7 +68,10 @@ class Stages:
 def worst(tableau: Tableau, weights: NDArray[np.float64], order: int) -> float:
     """Largest residual of the conditions of one order (Hairer, Norsett, Wanner I, theorem 2.13)."""
     stages = Stages(tableau.A)
-    return max(abs(float(weights @ stages.of(tree)) - 1 / density(tree)) for tree in trees(order))
+    return max(
+        abs(float(weights @ stages.elementary_weights(tree)) - 1 / density(tree))
+        for tree in trees(order)
+    )
 
 
 def test_there_are_as_many_trees_as_published() -> None:
@@ -99,7 +102,9 @@ def test_estimates_vanish_to_their_order_and_no_further() -> None:
         tableau = get(name)
         stages = Stages(np.vstack([np.pad(tableau.A, ((0, 0), (0, 1))), [*tableau.B, 0.0]]))
         for order in range(1, last + 2):
-            residual = max(abs(getattr(tableau, estimate) @ stages.of(t)) for t in trees(order))
+            residual = max(
+                abs(getattr(tableau, estimate) @ stages.elementary_weights(t)) for t in trees(order)
+            )
             assert residual < 1e-14 if order <= last else residual > 1e-6, (name, order)
     iterated = get("pirk13")
     assert iterated.E is not None
@@ -138,18 +143,21 @@ class Weights:
     def __init__(self, one: NDArray[np.float64], several: NDArray[np.float64]) -> None:
         self.one, self.several = one, several
 
-    def of(self, tree: Tree) -> NDArray[np.float64]:
-        """Of the stages, without the root's weight."""
+    def elementary_weights(self, tree: Tree) -> NDArray[np.float64]:
+        """Elementary weights of the stages, without the root's weight."""
         matrix = self.one if len(tree) == 1 else self.several
         product = np.ones(len(matrix))
         for branch in tree:
-            product = product * (matrix @ self.of(branch))
+            product = product * (matrix @ self.elementary_weights(branch))
         return product
 
     def worst(self, weights: NDArray[np.float64], order: int, step: bool = True) -> float:
         """Largest residual of the conditions of one order, of a step or of an error estimate."""
         return max(
-            abs(float(weights @ self.of(tree)) - (1 / density(tree) if step else 0.0))
+            abs(
+                float(weights @ self.elementary_weights(tree))
+                - (1 / density(tree) if step else 0.0)
+            )
             for tree in trees(order)
         )
 

@@ -26,13 +26,13 @@ STEPS = {
 }
 
 
-def mixed(t: Any) -> Any:
+def mixed_solution(t: Any) -> Any:
     """Solution of the system `mixed` from (1, 1)."""
     return np.stack([np.exp(np.sin(t)), 1.0 / (1.0 + np.asarray(t) ** 2)], axis=-1)
 
 
-def observed(errors: list[float], ratio: float = 2.0) -> float:
-    """Order from the last two, between which steps are shorter by a ratio."""
+def observed_order(errors: list[float], ratio: float = 2.0) -> float:
+    """Order from the last two errors, whose steps differ by a ratio."""
     return math.log(errors[-2] / errors[-1]) / math.log(ratio)
 
 
@@ -40,11 +40,13 @@ def observed(errors: list[float], ratio: float = 2.0) -> float:
 def test_fixed_steps_show_the_order(lab: Lab, method: str) -> None:
     problem = lab.problem("mixed", 2)
     errors = [
-        float(np.abs(problem.solved(method, 2.0, (1, 1), step=h).y - mixed(2.0)).max())
+        float(np.abs(problem.solved(method, 2.0, (1, 1), step=h).y - mixed_solution(2.0)).max())
         for h in STEPS[method]
     ]
     *_, before, last = STEPS[method]
-    assert observed(errors, before / last) == pytest.approx(get(method).order, abs=0.45), errors
+    assert observed_order(errors, before / last) == pytest.approx(get(method).order, abs=0.45), (
+        errors
+    )
 
 
 @pytest.mark.parametrize("method", STEPS)
@@ -54,11 +56,11 @@ def test_dense_output_shows_its_order_within_a_step(lab: Lab, method: str) -> No
     for h in (0.4, 0.2) if method == "pirk13" else (0.4, 0.2, 0.1):
         t = 0.3 + h * np.linspace(0.1, 0.9, 9)
         run = problem.solved(
-            method, 0.3 + h, mixed(0.3), t_start=0.3, step=h, output_times=t, capacity=3
+            method, 0.3 + h, mixed_solution(0.3), t_start=0.3, step=h, output_times=t, capacity=3
         )
         assert np.array_equal(run.samples.t, t)
-        errors.append(float(np.abs(run.samples.y - mixed(t)).max()))
-    assert observed(errors) > get(method).dense_order + 0.3, errors
+        errors.append(float(np.abs(run.samples.y - mixed_solution(t)).max()))
+    assert observed_order(errors) > get(method).dense_order + 0.3, errors
 
 
 @pytest.mark.parametrize("tolerance", [1e-6, 1e-9, 1e-12])
@@ -122,7 +124,7 @@ def test_a_break_keeps_the_order(lab: Lab, method: str) -> None:
     errors = [
         abs(problem.solved(method, t_end, [0.0], step=x, breaks=[at]).y[0] - exact) for x in h
     ]
-    assert observed(errors) > get(method).order - 0.6, errors
+    assert observed_order(errors) > get(method).order - 0.6, errors
     # off the grid: 0.4 does not divide the break's time any more
     moved = lab.problem("piecewise", 1, math.pi / 3)
     exact = piecewise(t_end, math.pi / 3)
@@ -209,10 +211,10 @@ def test_a_method_from_outside_runs(lab: Lab) -> None:
     tableau: Callable[[], Tableau] = method_from_outside
     problem = lab.problem("mixed", 2)
     errors = [
-        float(np.abs(problem.solved(tableau(), 2.0, (1, 1), step=h).y - mixed(2.0)).max())
+        float(np.abs(problem.solved(tableau(), 2.0, (1, 1), step=h).y - mixed_solution(2.0)).max())
         for h in (0.05, 0.025)
     ]
-    assert observed(errors) == pytest.approx(3.0, abs=0.3)
+    assert observed_order(errors) == pytest.approx(3.0, abs=0.3)
     run = problem.run(tableau(), 2.0, (1, 1), rtol=1e-6, atol=1e-9)
     assert run.advance() is Status.FINISHED
     theirs = solve_ivp(

@@ -10,7 +10,8 @@ import pytest
 import mstmm
 from mstmm.errors import SceneError
 from mstmm.runtime.linear.linear_model import Linear
-from tests.runtime.linear.test_frequency_response import Scene, chain, compiled, masses
+from tests.runtime.linear.test_frequency_response import Scene, chain, masses
+from tests.support.models import looped_model
 from tests.support.scenes.linear import pendulum
 
 OMEGA = np.array([0.4, 3.0, 11.0])
@@ -21,7 +22,7 @@ def test_one_mass_with_a_loss_factor() -> None:
     m, k, d, eta = 2.0, 50.0, 0.3, 0.04
     for links, damper in ((masses((m, k, d)), d), (masses((m, k, 0.0)), 0.0)):
         omega = np.array([0.1, 5.0, 700.0])
-        found = compiled(links).frequency_response(omega, ["s0.effort"], structural=eta)
+        found = looped_model(links).frequency_response(omega, ["s0.effort"], structural=eta)
         expected = 1 / (k * (1 + 1j * eta) + 1j * omega * damper - omega**2 * m)
         np.testing.assert_allclose(found.response[:, 0, 0], expected, rtol=1e-12)
     assert abs(found.response[1, 0, 0]) == pytest.approx(1 / (k * eta), rel=1e-12)
@@ -29,7 +30,7 @@ def test_one_mass_with_a_loss_factor() -> None:
 
 def test_two_masses_with_losses_of_their_own() -> None:
     (m1, k1), (m2, k2), losses = (3.0, 70.0), (1.0, 40.0), {"s0": 0.1, "s1": 0.02}
-    model = compiled(masses((m1, k1, 0.0), (m2, k2, 0.0)))
+    model = looped_model(masses((m1, k1, 0.0), (m2, k2, 0.0)))
     found = model.frequency_response(OMEGA, ["s1.effort"], structural=losses).response[:, :, 0]
     a, b = k1 * (1 + 0.1j), k2 * (1 + 0.02j)
     for w, values in zip(OMEGA, found, strict=True):
@@ -38,7 +39,7 @@ def test_two_masses_with_losses_of_their_own() -> None:
         np.testing.assert_allclose(values, np.linalg.solve(z, [0, 1]), rtol=1e-12)
 
 
-def mixed() -> Scene:
+def beam_and_chain_scene() -> Scene:
     """A beam on a sprung pin with a rod on a ball at its tip, a chain on that, and springs: one
     stretched to the ground, one between the beam and the chain."""
     rod = {"mass": 0.3, "center_of_mass": [0.2, 0, 0], "inertia": [0.01, 0.02, 0.02],
@@ -67,7 +68,7 @@ def mixed() -> Scene:
 
 @pytest.fixture(scope="module")
 def of_mixed() -> Linear:
-    return compiled(mixed()).linearize(inputs=["shoulder.effort", "rod.fy"])
+    return looped_model(beam_and_chain_scene()).linearize(inputs=["shoulder.effort", "rod.fy"])
 
 
 def check(linear: Linear, added: Any, **damping: Any) -> None:
@@ -114,7 +115,7 @@ def test_modal_ratios_are_those_of_the_natural_motions(of_mixed: Linear) -> None
 @pytest.mark.parametrize("links", [[(2.0, 50.0)], [(3.0, 70.0), (1.0, 100.0), (0.5, 20.0)]])
 def test_modal_damping_at_the_resonances_themselves(links: list[tuple[float, float]]) -> None:
     """Without it the answer has no bound there: superposed, 1 / (2 i zeta omega^2) and the rest."""
-    model = compiled(masses(*((m, k, 0.0) for m, k in links)))
+    model = looped_model(masses(*((m, k, 0.0) for m, k in links)))
     linear = model.linearize(inputs=["s0.effort"])
     modes = linear.modes()
     omega = np.array([*modes.omega, *(modes.omega * (1 + 1e-9))])
@@ -127,7 +128,9 @@ def test_modal_damping_at_the_resonances_themselves(links: list[tuple[float, flo
 
 
 def test_the_slowest_motions_of_many_are_damped_alone() -> None:
-    linear = compiled(chain(500, 0.0)).linearize(np.zeros(500), inputs=["rope[499].hinge.effort"])
+    linear = looped_model(chain(500, 0.0)).linearize(
+        np.zeros(500), inputs=["rope[499].hinge.effort"]
+    )
     modes = linear.modes(3)
     at = np.array([modes.omega[1], modes.omega[2] * 0.999])
     found = linear.frequency_response(at, modal=[0.01, 0.02, 0.03]).response[:, :, 0]
@@ -139,7 +142,7 @@ def test_the_slowest_motions_of_many_are_damped_alone() -> None:
 
 
 def test_what_cannot_be_damped_is_refused() -> None:
-    model = compiled(masses((2.0, 50.0, 0.0), (1.0, 3.0, 0.0)))
+    model = looped_model(masses((2.0, 50.0, 0.0), (1.0, 3.0, 0.0)))
 
     def ask(**damping: Any) -> None:
         model.frequency_response([1.0], ["s0.effort"], **damping)

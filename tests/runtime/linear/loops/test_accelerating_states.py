@@ -13,7 +13,7 @@ from mstmm.runtime.run.scene_system import SceneSystem
 from tests.reference.algebra import orientation, to_quaternion
 from tests.reference.compare import worst
 from tests.reference.jets import Array
-from tests.runtime.linear.test_drive_inputs_closed_loops import turned
+from tests.runtime.linear.test_drive_inputs_closed_loops import driven_five_bar
 from tests.runtime.model.test_equilibrium_closed_loops import five_bar
 from tests.runtime.packing.loops.test_cut_tree import LAWS
 from tests.support.models import compile_scene
@@ -59,7 +59,7 @@ def between_balls() -> dict[str, Any]:
     }  # fmt: skip
 
 
-def led() -> dict[str, Any]:
+def coupled_five_bar() -> dict[str, Any]:
     """A five-bar whose cranks a coupling that goes by time holds together."""
     together = {"expression": "foot1.q - 0.4*foot0.q^2", "equals": "0.6 + 0.5*t + t^2"}
     return five_bar({"stiffness": 3.0, "damping": 0.4}) | {"coupling": [together]}
@@ -72,8 +72,8 @@ MOVING: dict[str, tuple[Callable[[], mstmm.Model], float | list[float]]] = {
     "four-bar": (lambda: compile_scene(four_bar(laws=SMOOTH, tilt=OBLIQUE)), 1.7),
     "bricard": (lambda: compile_scene(ring()), -0.8),
     "on balls": (lambda: compile_scene(between_balls()), [1.1, -0.7]),
-    "driven": (lambda: turned(1.0, 0.9, 0), 0.6),
-    "led": (lambda: compile_scene(led()), -1.2),
+    "driven": (lambda: driven_five_bar(1.0, 0.9, 0), 0.6),
+    "led": (lambda: compile_scene(coupled_five_bar()), -1.2),
     "a bent rod": (lambda: mstmm.compile(mstmm.Scene(**slider_crank())), [0.8] + [0.0] * 20),
     "bent and shackled": (lambda: mstmm.compile(mstmm.Scene(**shackled())), 0.3),
     "at rest": (lambda: compile_scene(four_bar(laws=SMOOTH, tilt=OBLIQUE)), 0.0),
@@ -92,28 +92,28 @@ def test_slopes_along_closed_motions(scene: str) -> None:
     places = list(freedom.select(q))
     u = u + freedom.motion_matrix(q, places) @ (np.resize(speeds, len(places)) - u[places])
 
-    def closed(q: Array) -> tuple[Array, Array]:
-        """A state next to q and u in which they fit."""
+    def closed_state(q: Array) -> tuple[Array, Array]:
+        """A state near q and u that satisfies the loops."""
         whole = SceneSystem(model.looped).start(0.0, model.assemble(q, 0 * u)[0], u)
         return whole[: model.nq], whole[model.nq : model.nq + model.nu]
 
-    q, u = closed(q)
+    q, u = closed_state(q)
     linear = model.linearize(q, u)
     n, loops, memory = len(linear), linear.constrained_motion, model.looped.start_memory()
     assert loops is not None and list(linear.free_speed_indices) == places
     assert (linear.rate_matrix is not None) == (scene == "on balls")
 
-    def beside(x: Array, dv: Array) -> Array:
+    def speeds_and_accelerations(x: Array, dv: Array) -> Array:
         """All speeds, and the accelerations of the independent ones."""
         moved = q + model.looped.rates(0.0, q, loops.motion_basis @ x, memory)
-        moved, fit = closed(moved)
+        moved, fit = closed_state(moved)
         fit = fit + freedom.motion_matrix(moved, places) @ (u[places] + dv - fit[places])
         return np.concatenate([fit, model.accelerations(moved, fit)[places]])
 
     still, found = np.zeros(n), []
     for unit in np.eye(n) * STEP:
         for pair in ((unit, still), (still, unit)):
-            ahead, behind = (beside(s * pair[0], s * pair[1]) for s in (1, -1))
+            ahead, behind = (speeds_and_accelerations(s * pair[0], s * pair[1]) for s in (1, -1))
             found.append((ahead - behind) / (2 * STEP))
     by_x, by_v = np.array(found[::2]).T, np.array(found[1::2]).T
     turn = np.zeros((n, n)) if linear.rate_matrix is None else linear.rate_matrix
@@ -222,5 +222,5 @@ def test_parts_of_a_motion() -> None:
 
 
 def test_a_drive_that_drags_loops_along_leaves_no_rest() -> None:
-    (warning, *_) = turned(1.0, 0.9, 0).linearize().warnings
+    (warning, *_) = driven_five_bar(1.0, 0.9, 0).linearize().warnings
     assert warning.startswith("the state is not steady: foot0.angle accelerate")

@@ -25,7 +25,7 @@ LAWS: dict[str, dict[str, Any]] = {
 }
 
 
-def apart(found: Any, wanted: Any) -> float:
+def relative_difference(found: Any, wanted: Any) -> float:
     """Largest difference of complex numbers, in parts of the largest."""
     return float(np.abs(found - wanted).max() / np.abs(wanted).max())
 
@@ -68,7 +68,7 @@ def test_cutting_another_hinge_changes_nothing(cut: str) -> None:
     here, there = model.linearize(), plain.linearize()
     for name in ("M", "C", "K", "C_damping", "K_elastic", "K_geometric"):
         assert worst(getattr(here, name), getattr(there, name)) < 1e-10
-    assert apart(here.modes().eigenvalues, there.modes().eigenvalues) < 1e-10
+    assert relative_difference(here.modes().eigenvalues, there.modes().eigenvalues) < 1e-10
     energies = here.modes().strain_energy_shares()
     assert (
         worst(list(energies.values()), list(there.modes().strain_energy_shares().values())) < 1e-9
@@ -95,11 +95,11 @@ def test_matrices_are_slopes_of_accelerations(platform: mstmm.Model) -> None:
     )
     q, memory = linear.state.q, platform.looped.start_memory()
 
-    def closed(x: Array) -> Array:
+    def closed_position(x: Array) -> Array:
         return platform.assemble(q + platform.looped.rates(0.0, q, ways @ x, memory))[0]
 
     for k, unit in enumerate(np.eye(6) * size):
-        moved = [platform.accelerations(closed(s * unit), 0 * ways[:, 0]) for s in (1, -1)]
+        moved = [platform.accelerations(closed_position(s * unit), 0 * ways[:, 0]) for s in (1, -1)]
         going = [platform.accelerations(q, s * ways @ unit) for s in (1, -1)]
         for (ahead, behind), matrix in ((moved, linear.K), (going, linear.C)):
             found = (ahead - behind)[places] / (2 * size)
@@ -122,12 +122,12 @@ def test_responses_are_those_of_the_matrices(platform: mstmm.Model) -> None:
     found = linear.frequency_response(omega, outputs=outputs)
     for k, s in enumerate(1j * omega):
         wanted = c @ np.linalg.solve(s * np.eye(12) - linear.A, linear.B) + d
-        assert apart(found.response[k], wanted) < 1e-10
+        assert relative_difference(found.response[k], wanted) < 1e-10
     lossy = linear.frequency_response(omega, outputs=outputs, structural=0.1)
     stiff = linear.K + 0.1j * linear.K_elastic
     for k, s in enumerate(1j * omega):
         x = np.linalg.solve(s**2 * linear.M + s * linear.C + stiff, linear.V)
-        assert apart(lossy.response[k][2], c[2, :6] @ x) < 1e-10
+        assert relative_difference(lossy.response[k][2], c[2, :6] @ x) < 1e-10
 
 
 def test_windows_that_hang() -> None:

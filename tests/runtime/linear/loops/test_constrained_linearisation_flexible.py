@@ -184,11 +184,11 @@ def test_matrices_are_slopes_of_accelerations(make: Any) -> None:
     n, places, memory = len(linear), list(linear.free_speed_indices), model.looped.start_memory()
     assert loops is not None
 
-    def beside(x: Array) -> Array:
+    def accelerations_at(x: Array) -> Array:
         moved = q + model.looped.rates(0.0, q, loops.motion_basis @ x, memory)
         return model.accelerations(model.assemble(moved, still)[0], still)[places]
 
-    slopes = [(beside(x) - beside(-x)) / (2 * STEP) for x in STEP * np.eye(n)]
+    slopes = [(accelerations_at(x) - accelerations_at(-x)) / (2 * STEP) for x in STEP * np.eye(n)]
     assert worst(np.array(slopes).T, linear.A[n:, :n]) < 1e-6
     whole = linear.K_elastic + linear.K_geometric + linear.K_load
     assert worst(whole, linear.K) < 1e-12

@@ -18,7 +18,7 @@ Array = NDArray[Any]
 GRAVITY = 9.81
 
 
-def beside(linear: Linear) -> NonholonomicLinear:
+def nonholonomic_model(linear: Linear) -> NonholonomicLinear:
     assert isinstance(linear, NonholonomicLinear)
     return linear
 
@@ -37,7 +37,7 @@ BY_SPEED = np.array([[0.0, 76.59734589573222], [0.0, 2.65431523794604]])
 WEAVE, CAPSIZE, CASTER = -0.77534188219585 + 4.46486771378823j, -0.32286642900409, -14.0783896927982
 
 
-def published(speed: float) -> Array:
+def published_eigenvalues(speed: float) -> Array:
     """Eigenvalues of M q'' + v C1 q' + (g K0 + v^2 K2) q = 0."""
     stiffness = GRAVITY * STIFFNESS + speed**2 * BY_SPEED
     below = -np.linalg.solve(MASS, np.hstack([stiffness, speed * DAMPING]))
@@ -87,7 +87,7 @@ def riding(model: mstmm.Model, speed: float, heading: float = 0.0) -> tuple[Arra
     return q, u
 
 
-def paired(found: Array, expected: Array) -> float:
+def paired_distance(found: Array, expected: Array) -> float:
     """Largest distance from an expected value to the nearest that was found, each once."""
     left, far = list(found), 0.0
     for one in expected:
@@ -101,15 +101,15 @@ def test_the_benchmark_bicycle(bicycle: mstmm.Model, speed: float, heading: floa
     linear = bicycle.linearize(*riding(bicycle, speed, heading), inputs=[])
     found = np.linalg.eigvals(linear.A)
     moving = found[np.abs(found) > 1e-6]
-    assert len(moving) == 4 and paired(moving, published(speed)) < 1e-9
+    assert len(moving) == 4 and paired_distance(moving, published_eigenvalues(speed)) < 1e-9
     if speed == 5.0:
         table = [WEAVE, np.conj(WEAVE), CAPSIZE, CASTER]
-        assert paired(moving, np.array(table)) < 1e-8
+        assert paired_distance(moving, np.array(table)) < 1e-8
         modes = linear.modes()
         assert [x for x in modes.eigenvalues if x] == pytest.approx([CAPSIZE, WEAVE, CASTER])
         assert modes.trusted and not modes.unstable.any()
         assert set(modes.dominant_coordinates(len(modes) - 1)) >= {"steer.angle"}
-        assert beside(linear).frame_rates == {}
+        assert nonholonomic_model(linear).frame_rates == {}
         assert linear.coordinate_names[-2:] == ("steer.angle", "spin.angle")
 
 
@@ -134,13 +134,13 @@ def test_steering_torque_turns_the_bicycle(bicycle: mstmm.Model) -> None:
 def test_dry_friction_of_the_steering_is_left_out_or_counts_as_viscous() -> None:
     rough = benchmark(law={"friction": {"coulomb": 0.5}})
     free = rough.linearize(*riding(rough, 5.0), inputs=[])
-    assert paired(free.modes().eigenvalues, np.array([WEAVE, CAPSIZE, CASTER])) < 1e-8
+    assert paired_distance(free.modes().eigenvalues, np.array([WEAVE, CAPSIZE, CASTER])) < 1e-8
     assert "dry-friction" in {risk.name for risk in free.risks}
     damped = rough.linearize(*riding(rough, 5.0), inputs=[], friction=0.2)
     steer = 4 * 0.5 / (np.pi * 0.2)  # the damper of equal work
     below = np.hstack([GRAVITY * STIFFNESS + 25 * BY_SPEED, 5 * DAMPING + np.diag([0, steer])])
     expected = np.linalg.eigvals(np.vstack([np.eye(4)[2:], -np.linalg.solve(MASS, below)]))
-    assert paired(np.linalg.eigvals(damped.A), expected) < 1e-9
+    assert paired_distance(np.linalg.eigvals(damped.A), expected) < 1e-9
 
 
 # --- discs ----------------------------------------------------------------------------------------
@@ -175,7 +175,7 @@ def test_an_upright_disc_is_stable_above_a_third_of_g_r(speed: float, turned: fl
     (found,) = [x for x in modes.eigenvalues if x.imag] or [max(modes.eigenvalues, key=np.real)]
     assert found == pytest.approx(np.sqrt(complex(square)), rel=1e-9)
     assert modes.unstable.any() == (speed**2 < GRAVITY * RADIUS / 3)
-    assert beside(linear).frame_rates["fly"] == pytest.approx([0, spin, 0], abs=1e-12)
+    assert nonholonomic_model(linear).frame_rates["fly"] == pytest.approx([0, spin, 0], abs=1e-12)
     names = {risk.name for risk in linear.risks}
     assert names <= {"unrestrained", "unstable"} and linear.trusted
     assert linear.frame == modes.frame == "fixed" and linear.to_fixed_frame() is linear
@@ -292,7 +292,7 @@ def test_chaplygins_sleigh(speed: float, heading: float) -> None:
     (found,) = [x for x in linear.modes().eigenvalues if x]
     assert found == pytest.approx(-mass * arm * speed / (inertia + mass * arm**2), rel=1e-11)
     assert linear.coordinate_names == ("x.displacement", "y.displacement", "yaw.angle")
-    assert len(beside(linear).speeds) == 2 and linear.trusted
+    assert len(nonholonomic_model(linear).speeds) == 2 and linear.trusted
 
 
 # --- what it is -----------------------------------------------------------------------------------

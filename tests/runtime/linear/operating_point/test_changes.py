@@ -17,7 +17,7 @@ SPIN, MASS, STIFF, DAMPING = 3.0, 2.0, 200.0, 2.0
 SOLID = {"inertia": [0.1, 0.1, 0.1]}
 
 
-def of(**scene: Any) -> mstmm.Model:
+def compile_tables(**scene: Any) -> mstmm.Model:
     return mstmm.compile(mstmm.Scene(**{"gravity": (0, 0, 0), **scene}), engine="looped")
 
 
@@ -28,7 +28,7 @@ def turntable(drive: str = "3*t", on: str = "ground", **more: Any) -> mstmm.Mode
     table = {"name": "turn", "type": "pin", "inboard": on, "outboard": "table"}
     bodies = [{"name": "mount", "mass": 5.0, **SOLID}] if on == "mount" else []
     hinges = [rail | {"name": "spring", "inboard": "ground", "outboard": "mount"}] if bodies else []
-    return of(
+    return compile_tables(
         body=[*bodies, {"name": "table", "mass": 1.0, **SOLID},
               {"name": "slider", "mass": MASS, **SOLID}],
         hinge=[*hinges, table | ({"drive": drive} if drive else {}),
@@ -112,7 +112,7 @@ def test_stiffness_that_goes_with_time() -> None:
 def rotor(off: float, drive: str = "20*t", gravity: float = 0.0) -> mstmm.Model:
     """A rotor of 2 kg, its mass off its axis, on a mass of 1 kg on a spring of 1000 N/m."""
     rail = {"type": "prismatic", "axis": [1, 0, 0], "law": {"stiffness": 1000.0}}
-    return of(
+    return compile_tables(
         gravity=(0, 0, -gravity),
         body=[{"name": "frame", "mass": 1.0, **SOLID},
               {"name": "rotor", "mass": 2.0, "center_of_mass": [off, 0, 0], **SOLID,
@@ -165,7 +165,7 @@ def test_loads_that_go_with_time() -> None:
     """A load, and an input that follows a signal: rest of a moment, which says so."""
     model = mstmm.compile(pendulum(law={"effort": "0.1*sin(7*t)"}), engine="looped")
     gust = {"name": "gust", "times": [0, 50, 51, 60], "values": [0, 0, 1, 1]}
-    blown = of(
+    blown = compile_tables(
         gravity=(0, -9.81, 0), signal=[gust], input=[{"name": "wind", "value": "gust"}],
         body=[{"name": "bob", "mass": 1.0, "center_of_mass": [0, -1, 0], **SOLID}],
         hinge=[{"name": "pivot", "type": "pin", "inboard": "ground", "outboard": "bob",
@@ -196,7 +196,7 @@ def test_creep_is_followed_for_a_thousand_seconds(speed: float) -> None:
 def test_a_carriage_that_moves_on_is_steady() -> None:
     rail = {"name": "rail", "type": "prismatic", "axis": [1, 0, 0], "inboard": "ground",
             "outboard": "car", "drive": "2*t"}  # fmt: skip
-    model = of(
+    model = compile_tables(
         gravity=(0, -9.81, 0),
         body=[{"name": "car", "mass": 1.0, **SOLID},
               {"name": "bob", "mass": 1.0, "center_of_mass": [0, -1, 0], **SOLID}],
@@ -231,7 +231,7 @@ def test_closed_loops_that_turn() -> None:
             if mounted
             else []
         )
-        return of(
+        return compile_tables(
             body=[*bodies, {"name": "shaft", "mass": 1.0, **SOLID, "ends": {"far": [0.2, 0, 0]}},
                   arm | {"name": "a"}, arm | {"name": "b"},
                   {"name": "bar", "mass": 0.3, "center_of_mass": [0.1, 0, 0], **SOLID,

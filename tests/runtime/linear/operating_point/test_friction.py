@@ -20,7 +20,7 @@ WEIGHT, INERTIA = 2 * 9.81 * 0.5, 0.53
 RUB = {"coulomb": 0.01}
 
 
-def of(scene: mstmm.Scene, engine: str = "looped") -> mstmm.Model:
+def compile_model(scene: mstmm.Scene, engine: str = "looped") -> mstmm.Model:
     return mstmm.compile(scene, engine=engine)
 
 
@@ -31,7 +31,7 @@ def rough(law: dict[str, Any] | None = None, **friction: float) -> mstmm.Scene:
 @pytest.mark.parametrize("engine", ["looped", "fused"])
 def test_it_is_left_out_at_rest(engine: str) -> None:
     """sqrt(m g l/J) without damping; it sticks where its weight is less than friction."""
-    model = of(rough(), engine)
+    model = compile_model(rough(), engine)
     linear = model.linearize()
     np.testing.assert_allclose(linear.modes().eigenvalues, [1j * math.sqrt(WEIGHT / INERTIA)])
     (text,) = linear.warnings
@@ -45,10 +45,12 @@ def test_it_is_left_out_at_rest(engine: str) -> None:
 def test_it_is_viscous_at_an_amplitude(amplitude: float) -> None:
     """The damper that takes as much work from a sine as Coulomb's friction, 4 F/(pi V), and as
     Stribeck's law, by quadrature."""
-    coulomb = of(rough()).linearize(friction=amplitude)
+    coulomb = compile_model(rough()).linearize(friction=amplitude)
     assert coulomb.C[0, 0] == pytest.approx(4 * 0.01 / (math.pi * amplitude), rel=1e-12)
     assert not coulomb.warnings
-    linear = of(rough({"damping": 0.3}, static=0.025)).linearize(friction={"pivot": amplitude})
+    linear = compile_model(rough({"damping": 0.3}, static=0.025)).linearize(
+        friction={"pivot": amplitude}
+    )
 
     def work(x: float) -> float:
         speed = amplitude * math.sin(x)
@@ -62,7 +64,7 @@ def test_it_is_viscous_at_an_amplitude(amplitude: float) -> None:
 def test_a_hinge_that_slides_keeps_its_slope() -> None:
     """That of Stribeck's law at the speed of the motion."""
     speed = 0.02
-    linear = of(rough(static=0.05)).linearize([0.0], [speed])
+    linear = compile_model(rough(static=0.05)).linearize([0.0], [speed])
     slope = -2 * speed / 0.01**2 * 0.04 * math.exp(-((speed / 0.01) ** 2))
     assert linear.C[0, 0] == pytest.approx(slope, rel=1e-9)
     assert not any("friction" in text for text in linear.warnings)
@@ -73,7 +75,7 @@ def test_members_of_a_chain_by_themselves() -> None:
     body = {"mass": 1.0, "center_of_mass": [0, -0.5, 0], "inertia": [0.1, 0.1, 0.1],
             "ends": {"tip": [0, -1, 0]}}  # fmt: skip
     hinge = {"type": "pin", "law": {"damping": 0.2, "friction": {"coulomb": 1.0, "static": 2.0}}}
-    model = of(mstmm.Scene(
+    model = compile_model(mstmm.Scene(
         gravity=(0, 0, 0),
         chain=[{"name": "rope", "count": 3, "inboard": "ground", "body": body, "hinge": hinge,
                 "end": "tip"}],
@@ -92,7 +94,7 @@ def test_members_of_a_chain_by_themselves() -> None:
 
 def test_answers_to_harmonic_pushes() -> None:
     """1/(k - J w^2 + i w c), by the sweep."""
-    omega, model = np.array([0.5, 4.0, 9.0]), of(rough())
+    omega, model = np.array([0.5, 4.0, 9.0]), compile_model(rough())
     for friction, c in ((None, 0.0), (0.3, 4 * 0.01 / (math.pi * 0.3))):
         found = model.frequency_response(omega, ["pivot.effort"], friction=friction)
         expected = 1 / (WEIGHT - INERTIA * omega**2 + 1j * omega * c)
@@ -106,7 +108,7 @@ def test_growth_sets_in_where_the_given_damping_ends() -> None:
     """A motor that pushes with c u: at once without friction, at c = 4 F/(pi V) with it."""
     data = rough().model_dump(by_alias=True, exclude_defaults=True)
     data["hinge"][0]["law"]["effort"] = ["c*u"]
-    model = of(mstmm.Scene(constants={"c": 0.0}, **data))
+    model = compile_model(mstmm.Scene(constants={"c": 0.0}, **data))
     low, high = -0.1, 1.0
     assert model.stability_limit("constants.c", low, high).value == pytest.approx(0.0, abs=1e-6)
     found = model.stability_limit("constants.c", low, high, friction=0.2)
@@ -126,7 +128,7 @@ def test_in_closed_loops_at_rest_and_in_motion() -> None:
                  "ends": {"tip": [0, -0.3, 0]}}  # fmt: skip
         solid = {"mass": 1.0, "inertia": [0.01, 0.01, 0.01]}
         pin = {"type": "pin", "axis": [0, 0, 1], **law}
-        return of(mstmm.Scene(
+        return compile_model(mstmm.Scene(
             gravity=(0, -9.81, 0),
             body=[solid | {"name": "shaft"}, about | {"name": "arm"}, about | {"name": "rod"},
                   solid | {"name": "sleeve"}],
@@ -166,7 +168,7 @@ def test_in_closed_loops_at_rest_and_in_motion() -> None:
 
 
 def test_what_makes_no_sense() -> None:
-    model = of(rough())
+    model = compile_model(rough())
     with pytest.raises(SceneError, match=r'friction: "pivott": expected .*did you mean "?pivot'):
         model.linearize(friction={"pivott": 1.0})
     for wrong in (0.0, -1.0):
@@ -182,7 +184,7 @@ def test_beside_beams_without_shapes() -> None:
             "modes": {"y": 1}}  # fmt: skip
     hinge = {"name": "slew", "type": "pin", "inboard": "ground", "outboard": "jib",
              "law": {"stiffness": 10.0, "friction": {"coulomb": 0.5}}}  # fmt: skip
-    model = of(mstmm.Scene(gravity=(0, 0, 0), beam=[beam], hinge=[hinge]))
+    model = compile_model(mstmm.Scene(gravity=(0, 0, 0), beam=[beam], hinge=[hinge]))
     for friction, c in ((None, 0.0), (2.0, 1 / math.pi)):
         found = model.frequency_response(
             [2.0], ["slew.effort"], ["slew.angle"], exact=True, friction=friction
@@ -195,9 +197,9 @@ def test_friction_by_an_expression_is_told() -> None:
     damper are what they are."""
     scenes = {law: pendulum(law={"effort": law}) for law in
               ("-0.01*tanh(u/0.001)", "-0.3*u*abs(u)", "-0.2*u", "-2*sinh(u)")}  # fmt: skip
-    told = [law for law, scene in scenes.items() if not of(scene).linearize().trusted]
+    told = [law for law, scene in scenes.items() if not compile_model(scene).linearize().trusted]
     assert told == ["-0.01*tanh(u/0.001)"]
-    (text,) = of(scenes[told[0]]).linearize().warnings
+    (text,) = compile_model(scenes[told[0]]).linearize().warnings
     assert "damping of pivot.angle is valid for speeds close to the state only" in text
 
 
@@ -207,17 +209,17 @@ def test_friction_that_jumps_is_told() -> None:
     smooth = ["-0.2*u", "-0.3*u*abs(u)", "-0.3*sign(u)*u", "-0.2*u*where(u > 0, 1, 2)",
               "-0.01*sign(q)", "-1000*u"]  # fmt: skip
     for law in (*jumps, *smooth):
-        model = of(pendulum(law={"effort": law}))
+        model = compile_model(pendulum(law={"effort": law}))
         linear = model.linearize([0.0], [0.0])
         told = [risk for risk in linear.risks if risk.name == "dry-friction"]
         assert [risk.value for risk in told] == pytest.approx([jumps[law]] if law in jumps else [])
         assert linear.trusted == (law not in jumps)
         assert linear.frequency_response([2.0], ["pivot.effort"]).trusted == (law not in jumps)
         assert linear.modes().trusted == (law not in jumps)
-    model = of(pendulum(law={"effort": "where(u > 0, -0.01, 0.01)"}))
+    model = compile_model(pendulum(law={"effort": "where(u > 0, -0.01, 0.01)"}))
     (text,) = model.modes().warnings
     assert "an effort along pivot.angle jumps by 0.02 N*m" in text
-    sliding = of(pendulum(law={"effort": "-0.01*sign(u)"})).linearize([0.0], [0.5])
+    sliding = compile_model(pendulum(law={"effort": "-0.01*sign(u)"})).linearize([0.0], [0.5])
     assert not any(risk.name == "dry-friction" for risk in sliding.risks)
 
 
@@ -235,12 +237,14 @@ def row_of_pendulums(n: int, laws: dict[int, str]) -> mstmm.Scene:
 def test_friction_by_expressions_in_large_scenes_is_told() -> None:
     """Beyond 400 coordinates: a jump of 0.02, a damping that saturates, drag that does not."""
     laws = {3: "-0.01*sign(u)", 200: "-0.3*u*abs(u)", 300: "-0.2*u"}
-    jumping = of(row_of_pendulums(410, laws))
+    jumping = compile_model(row_of_pendulums(410, laws))
     linear = jumping.linearize(np.zeros(410))
     told = [risk for risk in linear.risks if risk.name == "dry-friction"]
     assert [risk.element for risk in told] == ["h3.angle"] and not linear.trusted
     assert told[0].value == pytest.approx(0.02)
-    saturating = of(row_of_pendulums(410, {7: "-0.01*tanh(u/0.001)", 200: "-0.3*u*abs(u)"}))
+    saturating = compile_model(
+        row_of_pendulums(410, {7: "-0.01*tanh(u/0.001)", 200: "-0.3*u*abs(u)"})
+    )
     told = [r for r in saturating.linearize(np.zeros(410)).risks if r.name == "dry-friction"]
     assert [risk.element for risk in told] == ["h7.angle"]
 
@@ -249,7 +253,7 @@ def spun_disc(law: str) -> mstmm.Model:
     """A disc that a drive spins, on a carriage whose slide along y has a law."""
     spring = {"stiffness": 100.0}
     light = {"mass": 0.1, "inertia": [1e-3] * 3}
-    return of(mstmm.Scene(
+    return compile_model(mstmm.Scene(
         gravity=(0, 0, 0),
         body=[{"name": "slide", **light}, {"name": "housing", **light},
               {"name": "disc", "mass": 1.0, "inertia": [0.1, 0.05, 0.05]}],
@@ -275,7 +279,7 @@ def test_friction_by_an_expression_is_told_beside_rolling() -> None:
     wheel = {"name": "wheel", "mass": 1.0, "inertia": [0.02, 0.04, 0.02]}
     arm = {"name": "arm", "mass": 0.5, "inertia": [0.01] * 3}
     for law, trusted in (("-0.01*sign(u)", False), ("-0.01*u", True)):
-        model = of(mstmm.Scene(
+        model = compile_model(mstmm.Scene(
             gravity=(0, 0, 0), body=[wheel, arm],
             hinge=[{"name": "motion", "type": "free", "inboard": "ground", "outboard": "wheel",
                     "initial": {"q": [0, 0, 0.3, 1, 0, 0, 0], "u": [0.6, 0, 0, 0, 2.0, 0]}},

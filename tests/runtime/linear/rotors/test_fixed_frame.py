@@ -81,7 +81,7 @@ def test_coordinates_that_turn_along_see_other_frequencies() -> None:
     np.testing.assert_allclose(np.sort(turned.frequency[0]), np.sort(modes.frequency), rtol=1e-9)
 
 
-def mounted(across: float) -> mstmm.Model:
+def rotor_on_carriage(across: float) -> mstmm.Model:
     """The same rotor on a carriage with a spring along y and another along z."""
     hinges = [
         {"name": "along", "type": "prismatic", "axis": [0, 1, 0], "inboard": "ground",
@@ -97,7 +97,7 @@ def mounted(across: float) -> mstmm.Model:
 @pytest.mark.parametrize("across", [3e4, 9e4])
 def test_a_rotor_on_a_mount_that_does_not_turn(across: float) -> None:
     """The mount may be stiffer along one axis: coefficients are constant in the fixed frame."""
-    model, spin = mounted(across), 120.0
+    model, spin = rotor_on_carriage(across), 120.0
     linear = model.with_parameters({"constants.spin": spin}).linearize()
     found = linear.to_fixed_frame().modes()
     mass, gyroscopic, stiffness = (np.zeros((6, 6)) for _ in range(3))

@@ -28,12 +28,12 @@ def weight(k: float, zeta: float, mass: float = 2.0) -> mstmm.Model:
     return mstmm.compile(scene, engine="looped")
 
 
-def seen(model: mstmm.Model, span: float, few: float = 0.0) -> Vibration:
+def vibration_from_start(model: mstmm.Model, span: float, few: float = 0.0) -> Vibration:
     return initial_vibration(model, 0.0, *model.initial_state(), span, few)
 
 
 def test_an_undamped_one_lasts_to_the_end() -> None:
-    found = seen(weight(5e3, 0.0), 10.0)
+    found = vibration_from_start(weight(5e3, 0.0), 10.0)
     assert found.rate == pytest.approx(50.0, rel=1e-6)
     assert found.radians(_ASKED) == pytest.approx(500.0, rel=1e-6)
     assert found.radians_above_speed(_ASKED) == pytest.approx(500.0, rel=1e-6)
@@ -44,7 +44,7 @@ def test_a_damped_one_lasts_until_it_has_fallen_to_what_is_asked() -> None:
     rest, x0 = m g / k, is x0 / (2 (1 - zeta^2)^(1/2)) for each.  Of the only length of a scene its
     largest part counts, so that what is asked is asked of it."""
     zeta = 0.05
-    found = seen(weight(5e3, zeta), 100.0)
+    found = vibration_from_start(weight(5e3, zeta), 100.0)
     assert found.radians(_ASKED) == pytest.approx(math.log(1 / _ASKED) / zeta, rel=1e-6)
     assert found.radians(2.0) == 0.0
     assert found.fastest_damping == pytest.approx(zeta, rel=1e-6)
@@ -60,7 +60,7 @@ def test_an_angle_is_measured_in_rad() -> None:
         "outboard": "rod", "law": {"stiffness": 1e5},
     }  # fmt: skip
     scene = mstmm.Scene(schema_version=1, gravity=[0.0, -9.81, 0.0], body=[rod], hinge=[pin])
-    found = seen(mstmm.compile(scene, engine="looped"), 1.0)
+    found = vibration_from_start(mstmm.compile(scene, engine="looped"), 1.0)
     static = 9.81 * 0.5 / 1e5
     assert found.position_amplitudes.max() == pytest.approx(static / 2, rel=1e-3)
     assert found.fastest_damping == pytest.approx(0.0, abs=1e-6)
@@ -71,7 +71,7 @@ def test_an_angle_is_measured_in_rad() -> None:
 
 
 def test_of_slow_motion_the_rate_alone_is_looked_up() -> None:
-    found = seen(weight(5e3, 0.0), 10.0, few=501.0)
+    found = vibration_from_start(weight(5e3, 0.0), 10.0, few=501.0)
     assert not found.has_motions and found.rate == pytest.approx(50.0, rel=1e-6)
     assert found.radians(_ASKED) == found.rate * found.span
     assert not len(found.rates) and not np.any(found.position_amplitudes)

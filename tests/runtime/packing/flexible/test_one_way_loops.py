@@ -82,12 +82,12 @@ def test_the_end_turns_with_the_shapes_and_the_slider_does_not(cut: str) -> None
     found = responding(linkage(cut, driven=True))
     (body,) = rigidified_bodies(found.model).one_way.values()
     expected = found.response("bar").eta @ body.ports["tip"].theta[2]
-    np.testing.assert_allclose(turned(found, "bar.tip"), expected, atol=1e-9)
+    np.testing.assert_allclose(response_angles(found, "bar.tip"), expected, atol=1e-9)
     assert np.abs(expected).max() > 1e-3
-    assert np.abs(turned(found, "slider")).max() == 0
+    assert np.abs(response_angles(found, "slider")).max() == 0
 
 
-def turned(found: OneWayResult, name: str) -> Array:
+def response_angles(found: OneWayResult, name: str) -> Array:
     """Angles (times,) about z by which the response turns a body or an end."""
     half = [np.arctan2(q[:, 3], q[:, 0]) for q in
             (found.orientation(name), found.rigid.orientation(name))]  # fmt: skip
@@ -166,7 +166,7 @@ def test_what_hangs_on_the_rod_beside_the_loop_moves_along(tmp_path: Path) -> No
     found = responding(scene)
     (body,) = rigidified_bodies(found.model).one_way.values()
     turn = found.response("bar").eta @ body.ports["tip"].theta[2]
-    np.testing.assert_allclose(turned(found, "bob"), turn, atol=1e-9)
+    np.testing.assert_allclose(response_angles(found, "bob"), turn, atol=1e-9)
     assert np.abs(turn).max() > 1e-3
     loaded = mstmm.load_result(found.save(tmp_path / "run.nc"))
     assert isinstance(loaded, OneWayResult)

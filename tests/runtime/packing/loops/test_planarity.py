@@ -69,7 +69,7 @@ def test_accelerations_are_those_in_space(count: int, base: str) -> None:
         assert found == pytest.approx(model.accelerations(*state), rel=1e-11, abs=1e-11)
 
 
-def turned(scene: dict[str, Any], rotation: Array) -> dict[str, Any]:
+def rotate_scene(scene: dict[str, Any], rotation: Array) -> dict[str, Any]:
     """The scene with everything in it turned, but for what acts in inertial axes."""
 
     def vector(of: list[float]) -> list[float]:
@@ -87,10 +87,10 @@ def turned(scene: dict[str, Any], rotation: Array) -> dict[str, Any]:
 @pytest.mark.parametrize("axis", [[0, 1, 0], [-1, 0, 0], [0, 0, -1], [0.3, 0.8, -0.5]])
 def test_the_plane_may_lie_anywhere(axis: list[float]) -> None:
     upright, z = windows(2, "ground"), [0.0, 0.0, 1.0]
-    lying = turned(upright, np.eye(3))
+    lying = rotate_scene(upright, np.eye(3))
     rotation = Rotation.align_vectors([axis], [z])[0].as_matrix()
     models = [mstmm.compile(mstmm.Scene(**scene), engine="looped")
-              for scene in (lying, turned(upright, rotation))]  # fmt: skip
+              for scene in (lying, rotate_scene(upright, rotation))]  # fmt: skip
     assert all(model.packed_scene.model.flat for model in models)
     found, expected = (model.accelerations(*model.initial_state()) for model in models)
     assert found == pytest.approx(expected, rel=1e-10, abs=1e-10)
@@ -99,7 +99,7 @@ def test_the_plane_may_lie_anywhere(axis: list[float]) -> None:
 def test_what_acts_in_inertial_axes_keeps_others_in_space() -> None:
     """A plane has axes of its own, in which nobody tells such a load."""
     aside = Rotation.from_euler("x", 90, degrees=True).as_matrix()
-    lying = turned(windows(2, "ground"), aside)
+    lying = rotate_scene(windows(2, "ground"), aside)
     load = {"on": "coupler0.coupler", "force": [1.0, 2.0, 3.0]}
     for more, in_a_plane in (({}, True), ({"load": [load]}, False)):
         model = mstmm.compile(mstmm.Scene(**(lying | more)), engine="looped")

@@ -28,11 +28,11 @@ ACCURACY = 1e-11
 Array = NDArray[np.float64]
 
 
-def packed(scene: dict[str, Any], align: bool = True) -> PackedScene:
+def pack_scene(scene: dict[str, Any], align: bool = True) -> PackedScene:
     return pack(mstmm.Scene(**scene), align=align)
 
 
-def linked(found: PackedScene) -> int:
+def link_count(found: PackedScene) -> int:
     """Number of bodies that are swept as links."""
     runs = [found.model.runs[k] for k in range(found.model.n_runs)]
     assert sum(run.count for run in runs) == found.system.count
@@ -45,7 +45,7 @@ def swept(found: PackedScene, q: Array, u: Array) -> Array:
     return engine.accelerations(0.3, q[None], u[None], memory[None])[1][0]
 
 
-def observed(found: PackedScene, q: Array, u: Array) -> Observation:
+def observe_state(found: PackedScene, q: Array, u: Array) -> Observation:
     engine = LoopedEngine(found)
     memory = engine.start_memory()
     return engine.observe(np.array([0.3]), q[None], u[None], memory[None])
@@ -56,11 +56,11 @@ def test_links_mean_what_blocks_mean(rng: np.random.Generator) -> None:
     for draw in range(24):
         types = AXIAL if draw % 2 else (*AXIAL, "ball", "universal")
         scene, q, u = fresh(rng, types=types, most=12, loads=False)
-        found = packed(scene)
-        count += linked(found)
+        found = pack_scene(scene)
+        count += link_count(found)
         udot = swept(found, q, u)
-        assert worst(udot, observed(found, q, u).udot[0]) < ACCURACY
-        assert worst(udot, swept(packed(scene, align=False), q, u)) < ACCURACY
+        assert worst(udot, observe_state(found, q, u).udot[0]) < ACCURACY
+        assert worst(udot, swept(pack_scene(scene, align=False), q, u)) < ACCURACY
     assert count > 5
 
 
@@ -86,10 +86,10 @@ def test_balls_are_links(kinds: str, law: dict[str, Any], rng: np.random.Generat
     names = {"b": "ball", "p": "pin", "s": "prismatic", "u": "universal"}
     scene = balls([names[kind] for kind in kinds], rng, law=law)
     q, u = random_state(scene, 5)
-    found = packed(scene)
-    assert linked(found) >= kinds.count("b")
+    found = pack_scene(scene)
+    assert link_count(found) >= kinds.count("b")
     udot = swept(found, q, u)
-    assert worst(udot, observed(found, q, u).udot[0]) < 1e-13
+    assert worst(udot, observe_state(found, q, u).udot[0]) < 1e-13
     assert worst(udot, newton_euler.solve(scene, q, u, 0.3).udot) < 1e-12
 
 
@@ -97,8 +97,8 @@ def test_balls_on_branches_are_links(rng: np.random.Generator) -> None:
     scene = balls(["ball", "pin", "ball", "ball", "pin", "ball"], rng)
     for i, parent in ((2, "rod0.tip"), (3, "rod1"), (4, "rod0.tip"), (5, "ground")):
         scene["hinge"][i]["inboard"] = parent
-    found = packed(scene)
-    assert linked(found) >= 4
+    found = pack_scene(scene)
+    assert link_count(found) >= 4
     q, u = random_state(scene, 6)
     assert worst(swept(found, q, u), newton_euler.solve(scene, q, u, 0.3).udot) < 1e-12
 
@@ -106,21 +106,21 @@ def test_balls_on_branches_are_links(rng: np.random.Generator) -> None:
 def test_balls_with_rotors_are_no_links(rng: np.random.Generator) -> None:
     scene = balls(["ball"] * 3, rng)
     scene["hinge"][1]["law"] = {"inertia": 0.2}
-    found = packed(scene)
-    assert linked(found) == 2
+    found = pack_scene(scene)
+    assert link_count(found) == 2
     q, u = random_state(scene, 7)
-    assert worst(swept(found, q, u), observed(found, q, u).udot[0]) < 1e-13
+    assert worst(swept(found, q, u), observe_state(found, q, u).udot[0]) < 1e-13
 
 
 def test_balls_of_the_users_are_no_links() -> None:
-    body = packed(chain(["ball"])).system.body(0)
+    body = pack_scene(chain(["ball"])).system.body(0)
     assert link_kernel(body) == "link_ball"
     assert link_kernel(replace(body, hinge=("hinge", "socket"))) == ""
 
 
 def test_a_ball_on_a_thin_rod_is_named_where_links_sweep_it() -> None:
-    thin = packed(chain(["ball"] * 2, inertia=(0.0, 1 / 12, 1 / 12)))
-    assert linked(thin) == 2
+    thin = pack_scene(chain(["ball"] * 2, inertia=(0.0, 1 / 12, 1 / 12)))
+    assert link_count(thin) == 2
     q, u = np.tile([1.0, 0, 0, 0], 2), np.zeros(6)
     with pytest.raises(mstmm.NumericalFailure, match="hinge1"):
         swept(thin, q, u)
@@ -130,9 +130,9 @@ def test_loads_are_at_the_hinge_wherever_the_frame_is(rng: np.random.Generator) 
     moved = 0
     for _ in range(12):
         scene, q, u = fresh(rng, types=AXIAL)
-        found, plain = packed(scene), packed(scene, align=False)
+        found, plain = pack_scene(scene), pack_scene(scene, align=False)
         moved += sum(abs(body.height) > 1e-3 for body in found.system.distinct)
-        one, two = observed(found, q, u), observed(plain, q, u)
+        one, two = observe_state(found, q, u), observe_state(plain, q, u)
         assert worst(one.loads, two.loads) < ACCURACY
         assert worst(one.efforts, two.efforts, floor=np.abs(two.loads).max()) < ACCURACY
         assert worst(one.sums, two.sums) < ACCURACY
@@ -151,8 +151,8 @@ def test_efforts_reach_links(rng: np.random.Generator) -> None:
 def test_angles_of_many_turns(turns: int, rng: np.random.Generator) -> None:
     scene = chain(["pin"] * 5, math.pi / 3, gravity=(0, -9.81, 0))
     q, u = rng.uniform(-1, 1, 5), rng.uniform(-1, 1, 5)
-    found = packed(scene)
-    assert linked(found) >= 4
+    found = pack_scene(scene)
+    assert link_count(found) >= 4
     assert (
         worst(swept(found, q + 2 * math.pi * turns, u), swept(found, q, u)) < 1e-14 * turns + 1e-12
     )
@@ -160,7 +160,7 @@ def test_angles_of_many_turns(turns: int, rng: np.random.Generator) -> None:
 
 @pytest.mark.parametrize("angle", [0.0, math.pi / 2])
 def test_right_angles_leave_zeros_and_ones(angle: float) -> None:
-    found = packed(chain(["pin"] * 4, angle, gravity=(0, -9.81, 0)))
+    found = pack_scene(chain(["pin"] * 4, angle, gravity=(0, -9.81, 0)))
     for i in range(1, 4):
         body = found.system.body(i)
         assert {abs(x) for x in body.connection[:9]} <= {0.0, 1.0}
@@ -170,10 +170,10 @@ def test_right_angles_leave_zeros_and_ones(angle: float) -> None:
 def test_nearly_parallel_axes_keep_the_hinges_own_frames() -> None:
     """Their common normal is far away, and a lever that long would cost digits."""
     scene = chain(["pin"] * 3, 1e-3, gravity=(0, -9.81, 0))
-    found = packed(scene)
+    found = pack_scene(scene)
     assert all(abs(body.height) < 4.0 for body in found.system.distinct)
     q, u = np.full(3, 0.3), np.full(3, -0.2)
-    assert worst(swept(found, q, u), swept(packed(scene, align=False), q, u)) < 1e-13
+    assert worst(swept(found, q, u), swept(pack_scene(scene, align=False), q, u)) < 1e-13
 
 
 # --- told and switched off ------------------------------------------------------------------------
@@ -188,12 +188,12 @@ def test_links_are_told_with_their_rotors_and_can_be_switched_off(rng: np.random
     assert set(told) == {("hinge0",), ("hinge1",), ("hinge2",), ("hinge3",)}
     assert 'type "pin" with rotor inertia' in told["hinge1",]
     assert 'type "ball":' in told["hinge2",]
-    assert linked(model.packed_scene) == 4
+    assert link_count(model.packed_scene) == 4
     q, u = model.initial_state()
     u = rng.uniform(-1, 1, len(u))
     for without in (False, ["welds"], {"links": False}):
         plain = mstmm.compile(mstmm.Scene(**scene), engine="looped", simplify=without)
-        assert not plain.simplifications and linked(plain.packed_scene) == 0
+        assert not plain.simplifications and link_count(plain.packed_scene) == 0
         assert worst(plain.accelerations(q, u), model.accelerations(q, u)) < ACCURACY
 
 

@@ -267,7 +267,7 @@ def test_words_for_paths_that_make_no_sense(run: Result, tmp_path: Path) -> None
         mstmm.load_result(tmp_path / "other.nc")
 
 
-def _dropped(name: str) -> Callable[[xarray.Dataset], xarray.Dataset]:
+def _drop_variable(name: str) -> Callable[[xarray.Dataset], xarray.Dataset]:
     return lambda data: data.drop_vars(name)
 
 
@@ -288,7 +288,10 @@ def _as_text(name: str) -> Callable[[xarray.Dataset], xarray.Dataset]:
 
 
 CHANGES: dict[str, Callable[[xarray.Dataset], xarray.Dataset]] = {
-    **{f"no {name}": _dropped(name) for name in ("q", "u", "memory", "work", "event", "last_q")},
+    **{
+        f"no {name}": _drop_variable(name)
+        for name in ("q", "u", "memory", "work", "event", "last_q")
+    },
     **{f"text in {name}": _as_text(name) for name in ("q", "memory", "event", "error_q_0")},
     **{
         f"no {name}": _without_attribute(name)

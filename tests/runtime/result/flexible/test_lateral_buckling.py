@@ -30,7 +30,9 @@ def scene(load: list[Any], **changes: Any) -> mstmm.Scene:
     return mstmm.Scene(gravity=(0, 0, 0), beam=[BEAM | changes], hinge=[HELD], load=[push])
 
 
-def found(carried: str, size: float, of: Any, held: float = 0.0, line: float = LENGTH) -> float:
+def load_ratio(
+    carried: str, size: float, of: Any, held: float = 0.0, line: float = LENGTH
+) -> float:
     """Load over critical load where the sections at x carry size * of(L - x)."""
     expanded = expansion_of(scene([0, 0, 0]))
     assert expanded is not None
@@ -58,18 +60,20 @@ ROOT = np.sqrt(SOFT * TWISTED)
     ],
 )
 def test_critical_loads(carried: str, size: float, of: Any) -> None:
-    assert found(carried, size, of) == pytest.approx(1.0, rel=1e-4)
-    assert found(carried, 0.0 * size, of) == 0.0
+    assert load_ratio(carried, size, of) == pytest.approx(1.0, rel=1e-4)
+    assert load_ratio(carried, 0.0 * size, of) == 0.0
     power = 1 if carried == "M_z" else 2  # the same along a line twice as long
-    assert found(carried, size, np.ones_like, line=2 * LENGTH) == pytest.approx(
-        2**power * found(carried, size, np.ones_like)
+    assert load_ratio(carried, size, np.ones_like, line=2 * LENGTH) == pytest.approx(
+        2**power * load_ratio(carried, size, np.ones_like)
     )
 
 
 def test_a_beam_held_in_its_middle_and_a_pull() -> None:
-    half = found("N", -(np.pi**2) / 4 * SOFT / (LENGTH / 2) ** 2, np.ones_like, held=LENGTH / 2)
+    half = load_ratio(
+        "N", -(np.pi**2) / 4 * SOFT / (LENGTH / 2) ** 2, np.ones_like, held=LENGTH / 2
+    )
     assert half == pytest.approx(1.0, rel=1e-4)
-    assert found("N", 1e3, np.ones_like) == 0.0
+    assert load_ratio("N", 1e3, np.ones_like) == 0.0
 
 
 @pytest.mark.parametrize("modes", [{"y": 2}, {"y": 2, "z": 2}])

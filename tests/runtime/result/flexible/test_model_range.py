@@ -133,7 +133,7 @@ def test_positions_that_are_no_numbers_are_no_success() -> None:
 # --- slenderness ----------------------------------------------------------------------------------
 
 
-def welded(
+def welded_beams(
     parts: int, length: float, angle: float = 0.0, kind: str = "fixed", collar: int | None = None,
     **last: str,
 ) -> mstmm.Scene:  # fmt: skip
@@ -157,37 +157,37 @@ def welded(
 
 
 def test_the_height_follows_from_bending_and_axial_stiffness() -> None:
-    (warning,) = welded(1, 0.5).warnings
+    (warning,) = welded_beams(1, 0.5).warnings
     assert "its length is 5 times the height" in warning
     assert "(0.1 m from bending_stiffness and axial_stiffness)" in warning
-    assert welded(1, 1.5).warnings == ()
+    assert welded_beams(1, 1.5).warnings == ()
 
 
 def test_beams_welded_in_line_are_judged_as_one() -> None:
-    assert welded(4, 2.0).warnings == ()
-    (warning,) = welded(4, 0.8).warnings
+    assert welded_beams(4, 2.0).warnings == ()
+    (warning,) = welded_beams(4, 0.8).warnings
     assert 'beam "part0": its line of welded beams is 8 times the height' in warning
-    assert len(welded(4, 2.0, angle=1.0).warnings) == 4
-    assert len(welded(4, 2.0, kind="pin").warnings) == 4
+    assert len(welded_beams(4, 2.0, angle=1.0).warnings) == 4
+    assert len(welded_beams(4, 2.0, kind="pin").warnings) == 4
 
 
 def test_a_short_thick_piece_does_not_make_a_line_short() -> None:
     """A collar of twice the height on a tenth of a shaft that is 15 heights long."""
-    assert welded(10, 1.5, collar=4).warnings == ()
+    assert welded_beams(10, 1.5, collar=4).warnings == ()
 
 
 def test_a_beam_welded_tip_to_tip_is_in_line_too() -> None:
-    assert welded(2, 1.5, np.pi, outboard="part1.tip").warnings == ()
-    assert len(welded(2, 1.5, 0.0, outboard="part1.tip").warnings) == 2  # folded back
+    assert welded_beams(2, 1.5, np.pi, outboard="part1.tip").warnings == ()
+    assert len(welded_beams(2, 1.5, 0.0, outboard="part1.tip").warnings) == 2  # folded back
 
 
 def test_shapes_of_welded_beams_are_judged_on_the_line() -> None:
     """As many shapes on four times the length have a sixteenth of the error."""
-    alone = mstmm.compile(welded(1, 1.0)).flexible_bodies["part0"]
+    alone = mstmm.compile(welded_beams(1, 1.0)).flexible_bodies["part0"]
     by_hand = 0.5 * 4.694091**2 * 0.1**2 / 12 * (3.12 + 1)  # beta L of the second shape: 4.694
     errors = shear_errors(alone)
     assert errors is not None and errors.max() == pytest.approx(by_hand, rel=1e-5)
-    model = mstmm.compile(welded(4, 4.0))
+    model = mstmm.compile(welded_beams(4, 4.0))
     part = shear_errors(model.flexible_bodies["part0"])
     on_line = shear_errors(model.flexible_bodies["part0"], 4.0)
     assert part is not None and on_line is not None

@@ -58,14 +58,14 @@ def scene(**beam: Any) -> mstmm.Scene:
 TIMES = np.linspace(0.0, 0.4, 21)
 
 
-def simulated(level: str | None, **beam: Any) -> mstmm.Result:
+def simulate_level(level: str | None, **beam: Any) -> mstmm.Result:
     return mstmm.compile(scene(**beam), "looped", flexibility=level).simulate(
         0.4, output_times=TIMES
     )
 
 
 def one_way(**beam: Any) -> OneWayResult:
-    result = simulated("one-way", **beam)
+    result = simulate_level("one-way", **beam)
     assert isinstance(result, OneWayResult)
     return result
 
@@ -89,7 +89,7 @@ def by_hand() -> mstmm.Result:
 @pytest.mark.parametrize("level", ["rigid", "one-way"])
 def test_rigid_run(level: str) -> None:
     """Mass, inertia, ends and loads are those of the undeformed arm, at both levels."""
-    found, expected = simulated(level), by_hand()
+    found, expected = simulate_level(level), by_hand()
     assert found.model.coordinate_layout.q_names == ["axle.angle", "joint.angle"]
     assert np.abs(found.q - expected.q).max() < 1e-9
     for hinge in ("axle", "root", "joint"):
@@ -100,10 +100,10 @@ def test_rigid_run(level: str) -> None:
 
 
 def test_the_bodys_own_key_and_the_option_agree(tmp_path: Path) -> None:
-    option, key = one_way(), simulated(None, model="one-way")
+    option, key = one_way(), simulate_level(None, model="one-way")
     assert isinstance(key, OneWayResult)
     assert np.array_equal(option.position("bob"), key.position("bob"))
-    assert not isinstance(simulated("coupled", model="one-way"), OneWayResult)
+    assert not isinstance(simulate_level("coupled", model="one-way"), OneWayResult)
     loaded = mstmm.load_result(option.save(tmp_path / "run.nc"))
     assert isinstance(loaded, OneWayResult)
     assert np.allclose(loaded.position("bob"), option.position("bob"), atol=1e-12)
@@ -118,7 +118,7 @@ def test_the_bodys_own_key_and_the_option_agree(tmp_path: Path) -> None:
 )
 def test_refused(level: str, beam: dict[str, Any], words: str) -> None:
     with pytest.raises(SceneError, match=words):
-        simulated(level, **beam)
+        simulate_level(level, **beam)
 
 
 # --- the response ---------------------------------------------------------------------------------
@@ -130,7 +130,7 @@ def test_response_improves_on_the_rigid_run() -> None:
     (Once it vibrates it does so without what it carries, at another frequency.)
     """
     stiff = {"bending_stiffness": 2000.0, "torsional_stiffness": 400.0, "initial": "static"}
-    coupled, found, rigid = (simulated(x, **stiff) for x in ("coupled", "one-way", "rigid"))
+    coupled, found, rigid = (simulate_level(x, **stiff) for x in ("coupled", "one-way", "rigid"))
     for name in ("arm.tip", "bob"):
         left = np.abs(found.position(name) - coupled.position(name)).max()
         assert left < 0.35 * np.abs(rigid.position(name) - coupled.position(name)).max()

@@ -60,15 +60,15 @@ def test_the_column_of_an_effort_is_how_the_length_goes() -> None:
     np.testing.assert_allclose(c[1], [0, 0, *c[0, :2]], atol=1e-13)
     np.testing.assert_allclose(d, [[0, 0], [0, 0], [0, 1]], atol=1e-13)
 
-    def seen(q: Any, u: Any) -> np.ndarray:
+    def length_and_effort(q: Any, u: Any) -> np.ndarray:
         run = model.simulate(1e-9, output_times=[0.0], initial=(q, u))
         return np.array([run.quantity(f"strut.{x}").values[0] for x in ("length", "effort")])
 
     q, u, step = linear.state.q, linear.state.u, 1e-6
     for k in range(2):
         e = step * np.eye(2)[k]
-        by_q = (seen(q + e, u) - seen(q - e, u)) / (2 * step)
-        by_u = (seen(q, u + e) - seen(q, u - e)) / (2 * step)
+        by_q = (length_and_effort(q + e, u) - length_and_effort(q - e, u)) / (2 * step)
+        by_u = (length_and_effort(q, u + e) - length_and_effort(q, u - e)) / (2 * step)
         np.testing.assert_allclose(c[[0, 2], k], by_q, rtol=1e-6, atol=1e-7)
         np.testing.assert_allclose(c[2, 2 + k], by_u[1], rtol=1e-6, atol=1e-7)
 

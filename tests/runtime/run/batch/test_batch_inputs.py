@@ -42,7 +42,7 @@ def starts(n: int) -> tuple[Any, Any]:
     return rng.uniform(-1, 1, (n, 2)), rng.uniform(-1, 1, (n, 2))
 
 
-def given(n: int, interpolation: str = "line") -> dict[str, Any]:
+def batch_inputs(n: int, interpolation: str = "line") -> dict[str, Any]:
     rng = np.random.default_rng(4)
     signal = {"times": TIMES, "values": rng.normal(size=(n, 4)), "interpolation": interpolation}
     return {"motor": signal, "push": rng.normal(size=n)}
@@ -58,7 +58,7 @@ def row(inputs: dict[str, Any], k: int) -> dict[str, Any]:
 @pytest.mark.parametrize("interpolation", ["line", "hold", "cubic"])
 @pytest.mark.parametrize("engine", ENGINES)
 def test_each_trajectory_is_the_run_under_its_inputs(engine: str, interpolation: str) -> None:
-    model, (q, u), inputs = arm(engine), starts(7), given(7, interpolation)
+    model, (q, u), inputs = arm(engine), starts(7), batch_inputs(7, interpolation)
     batch = model.simulate_batch((q, u), inputs=inputs, **RUN)
     assert batch.success.all()
     assert ("side by side" in batch.engine) == (engine == "fused")
@@ -70,7 +70,7 @@ def test_each_trajectory_is_the_run_under_its_inputs(engine: str, interpolation:
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_neighbours_and_threads_change_nothing(engine: str) -> None:
-    model, (q, u), inputs = arm(engine), starts(11), given(11)
+    model, (q, u), inputs = arm(engine), starts(11), batch_inputs(11)
     whole = model.simulate_batch((q, u), inputs=inputs, threads=2, **RUN)
     some = np.array([8, 2, 5])
     part = inputs["motor"] | {"values": inputs["motor"]["values"][some]}

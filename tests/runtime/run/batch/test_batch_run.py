@@ -52,18 +52,18 @@ def states(model: Model, n: int) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, 
 
 
 @cache
-def compiled(kind: str, engine: str) -> Model:
+def rod_model(kind: str, engine: str) -> Model:
     return mstmm.compile(rods("pin", "pin") if kind == "pins" else rods("ball"), engine=engine)
 
 
 @pytest.fixture(params=[(kind, engine) for kind in ("pins", "ball") for engine in ENGINES])
 def model(request: pytest.FixtureRequest) -> Model:
-    return compiled(*request.param)
+    return rod_model(*request.param)
 
 
 @pytest.fixture(params=ENGINES)
 def pins(request: pytest.FixtureRequest) -> Model:
-    return compiled("pins", request.param)
+    return rod_model("pins", request.param)
 
 
 def test_size_neighbours_and_threads_change_nothing(model: Model) -> None:
@@ -188,7 +188,7 @@ def test_what_makes_no_sense_is_refused(pins: Model) -> None:
 def test_an_interrupt_ends_a_batch(
     engine: str, which: signal.Signals, heard: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    model = compiled("pins", engine)
+    model = rod_model("pins", engine)
     q, u = states(model, 40)
     before = signal.getsignal(which)
 

@@ -88,12 +88,12 @@ def test_forces_that_close_the_loop_hold_the_shapes(name: str) -> None:
     tree = opened(scene, rows, ends)
     q, u = np.delete(q, wrist.q_slice), np.delete(u, wrist.u_slice)
 
-    def needed(forces: Array) -> Array:
+    def required_efforts(forces: Array) -> Array:
         one = tree.with_inputs({f"pull{k}": float(x) for k, x in enumerate(forces)})
         return one.inverse_dynamics(q, u, 0 * u)
 
-    none = needed(np.zeros(rows))
-    columns = np.array([needed(unit) - none for unit in np.eye(rows)]).T
+    none = required_efforts(np.zeros(rows))
+    columns = np.array([required_efforts(unit) - none for unit in np.eye(rows)]).T
     free = np.delete(np.arange(len(u)), held)
     forces = np.linalg.lstsq(columns[free], -none[free], rcond=None)[0]
     left = none + columns @ forces
