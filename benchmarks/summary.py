@@ -192,24 +192,25 @@ def draw_summary(path: Path) -> None:
 
     forward_run = load_run_module("forward_dynamics")
     results = load_record("forward_dynamics")
-    figure, panels = plt.subplots(1, 3, figsize=(11.5, 4.1))
-    figure.subplots_adjust(left=0.055, right=0.99, top=0.91, bottom=0.19, wspace=0.24)
-    for name in ("mstmm fused", "mstmm looped", "CasADi C", "Pinocchio", "MuJoCo", "Drake"):
-        times = {r["bodies"]: forward_run.best_times(r).get(name) for r in results["results"]
-                 if r["kind"] == "pins"}  # fmt: skip
-        points = [(n, value / n) for n, value in times.items() if value]
-        panels[0].plot(*zip(*points, strict=True), **style.line_style(name))
-    panels[0].set(xscale="log", yscale="log", xlabel="bodies", ylabel="CPU ns per body",
-                  title="Accelerations of a chain of pins")  # fmt: skip
-    panels[0].legend(fontsize=7.5, labelspacing=0.2)
-    _ratios(panels[1], results["results"], forward_run)
-    data = load_record("work_precision")
-    _precision(panels[2], data)
-    style.add_footer(
-        figure, results,
-        "CPU times of one run, latency-chained, each program in its best form.",
-    )  # fmt: skip
-    style.save_figure(figure, path)
+    with plt.rc_context(style.PARAMETERS):
+        figure, panels = plt.subplots(1, 3, figsize=(11.5, 4.1))
+        figure.subplots_adjust(left=0.055, right=0.99, top=0.91, bottom=0.19, wspace=0.24)
+        for name in ("mstmm fused", "mstmm looped", "CasADi C", "Pinocchio", "MuJoCo", "Drake"):
+            times = {r["bodies"]: forward_run.best_times(r).get(name) for r in results["results"]
+                     if r["kind"] == "pins"}  # fmt: skip
+            points = [(n, value / n) for n, value in times.items() if value]
+            panels[0].plot(*zip(*points, strict=True), **style.line_style(name))
+        panels[0].set(xscale="log", yscale="log", xlabel="bodies", ylabel="CPU ns per body",
+                      title="Accelerations of a chain of pins")  # fmt: skip
+        panels[0].legend(fontsize=7.5, labelspacing=0.2)
+        _ratios(panels[1], results["results"], forward_run)
+        data = load_record("work_precision")
+        _precision(panels[2], data)
+        style.add_footer(
+            figure, results,
+            "CPU times of one run, latency-chained, each program in its best form.",
+        )  # fmt: skip
+        style.save_figure(figure, path)
 
 
 def _ratios(axes: Any, results: list[dict[str, Any]], run: ModuleType) -> None:

@@ -16,6 +16,7 @@ COLOURS = {
 }  # fmt: skip
 
 
+@style.styled
 def draw(record: dict[str, Any], best_times: Callable[..., dict[str, float]], path: Path) -> None:
     """Grouped bars, millions of states per second."""
     figure, axes = plt.subplots(figsize=(10, 4.6))

@@ -26,15 +26,17 @@ LINE_STYLES: dict[str, dict[str, Any]] = {
     "Exudyn": {"color": "#7f7f7f", "marker": "h", "lw": 1.5},
 }
 
-mpl.rcParams.update(
-    {
-        "font.size": 9, "font.family": "DejaVu Sans", "axes.spines.top": False,
-        "axes.spines.right": False, "axes.grid": True, "grid.color": "#e3e3e3",
-        "grid.linewidth": 0.6, "axes.axisbelow": True, "legend.frameon": False,
-        "figure.dpi": 110, "savefig.dpi": 170, "lines.markersize": 5,
-        "axes.titlesize": 10, "axes.titleweight": "bold", "axes.titlelocation": "left",
-    }
-)  # fmt: skip
+#: Parameters of matplotlib.
+PARAMETERS: dict[str, Any] = {
+    "font.size": 9, "font.family": "DejaVu Sans", "axes.spines.top": False,
+    "axes.spines.right": False, "axes.grid": True, "grid.color": "#e3e3e3",
+    "grid.linewidth": 0.6, "axes.axisbelow": True, "legend.frameon": False,
+    "figure.dpi": 110, "savefig.dpi": 170, "lines.markersize": 5,
+    "axes.titlesize": 10, "axes.titleweight": "bold", "axes.titlelocation": "left",
+}  # fmt: skip
+
+#: Decorator of a function that draws in this style.
+styled = mpl.rc_context(PARAMETERS)
 
 
 def line_style(name: str) -> dict[str, Any]:

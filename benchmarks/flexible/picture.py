@@ -17,6 +17,7 @@ ERRORS = {
 }  # fmt: skip
 
 
+@style.styled
 def draw(record: dict[str, Any], is_accurate: Callable[[dict[str, Any]], bool], path: Path) -> None:
     """One panel per scene."""
     figure, panels = plt.subplots(1, 2, figsize=(10, 4.6))

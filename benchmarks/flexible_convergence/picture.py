@@ -26,6 +26,7 @@ LINE_STYLES: dict[str, dict[str, Any]] = {
 }
 
 
+@style.styled
 def draw(record: dict[str, Any], path: Path) -> None:
     """Three motions above; frequencies and spin-ups below."""
     figure, panels = plt.subplots(2, 3, figsize=(11.5, 7.2))

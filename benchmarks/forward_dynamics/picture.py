@@ -16,6 +16,7 @@ CHAINS = {
 Best = Callable[[dict[str, Any]], dict[str, float]]
 
 
+@style.styled
 def draw(record: dict[str, Any], best: Best, path: Path) -> None:
     """CPU ns per body over the length for three kinds of chain; ratios to CasADi below."""
     figure = plt.figure(figsize=(10, 7.2))

@@ -101,16 +101,17 @@ def draw(record: dict[str, Any], path: Path) -> None:
     import matplotlib.pyplot as plt
     from common import style
 
-    figure, axes = plt.subplots(figsize=(6, 4.5))
-    for tool in ("mstmm", "python-control", "dense M, C, K"):
-        rows = [r for r in record["results"] if r["tool"] == tool]
-        axes.loglog([r["bodies"] for r in rows], [min(r["us"]) for r in rows], "o-", label=tool)
-    axes.set_xlabel("bodies")
-    axes.set_ylabel("one frequency, CPU us")
-    axes.legend()
-    figure.subplots_adjust(bottom=0.2)
-    style.add_footer(figure, record, "Chains of rods on pins; one input, one output.")
-    style.save_figure(figure, path)
+    with plt.rc_context(style.PARAMETERS):
+        figure, axes = plt.subplots(figsize=(6, 4.5))
+        for tool in ("mstmm", "python-control", "dense M, C, K"):
+            rows = [r for r in record["results"] if r["tool"] == tool]
+            axes.loglog([r["bodies"] for r in rows], [min(r["us"]) for r in rows], "o-", label=tool)
+        axes.set_xlabel("bodies")
+        axes.set_ylabel("one frequency, CPU us")
+        axes.legend()
+        figure.subplots_adjust(bottom=0.2)
+        style.add_footer(figure, record, "Chains of rods on pins; one input, one output.")
+        style.save_figure(figure, path)
 
 
 def main() -> None:

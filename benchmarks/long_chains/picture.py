@@ -21,6 +21,7 @@ PANELS = (
 )
 
 
+@style.styled
 def draw(record: dict[str, Any], path: Path) -> None:
     """Two rows (pins, balls), three columns."""
     figure, panels = plt.subplots(2, 3, figsize=(10, 6.6), sharex=True)

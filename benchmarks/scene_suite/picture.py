@@ -29,6 +29,7 @@ COLUMNS = 4
 _DPI = 110
 
 
+@style.styled
 def draw(record: dict[str, Any], path: Path) -> None:
     """All scenes of the record."""
     results = record["results"]

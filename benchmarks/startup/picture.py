@@ -24,6 +24,7 @@ LABELS = {
 }
 
 
+@style.styled
 def draw(record: dict[str, Any], path: Path) -> None:
     """Horizontal bars of the smallest CPU times."""
     figure, axes = plt.subplots(figsize=(8.2, 4.3))

@@ -35,6 +35,7 @@ ERRORS = (1e-1, 1e-9)  # m, from left to right
 COLUMNS = 3
 
 
+@style.styled
 def draw(record: dict[str, Any], path: Path) -> None:
     """All cases of the record."""
     results = record["results"]

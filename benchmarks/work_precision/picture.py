@@ -16,6 +16,7 @@ LINE_STYLES = {
 }
 
 
+@style.styled
 def draw(record: dict[str, Any], cheapest: Callable[..., Any], path: Path) -> None:
     """CPU time over achieved error, one panel per scene."""
     figure, panels = plt.subplots(1, 2, figsize=(10, 4.6), sharey=True)
