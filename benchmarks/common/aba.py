@@ -457,7 +457,8 @@ def articulated_body(
 ) -> tuple[ca.Function, np.ndarray]:
     """f(p, q, u, tau) -> (qdot, udot), and the numbers p of this tree.
 
-    With `ahead` the function has two more inputs: sines and cosines of the pins' angles, in order.
+    With `precomputed_sines` the function has two more inputs: sines and cosines of the angles of
+    the pins, in order.
     """
     numbers = Numbers(baked)
     ground = Ground(numbers.vector(tree.gravity))

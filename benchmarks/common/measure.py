@@ -84,7 +84,7 @@ def cpu_time(work: Callable[[], object]) -> float:
 
 
 def call_time(work: Callable[[], object], min_duration: float = 5e-3) -> float:
-    """CPU seconds of one run; short ones are repeated until they last `least` s."""
+    """CPU seconds of one run; short ones are repeated until they last `min_duration` s."""
     first = cpu_time(work)
     if first > min_duration:
         return first

@@ -44,7 +44,7 @@ class Planar:
     def add_body(
         self, origin: Point, angle: float, center: Point, mass: float, inertia: float
     ) -> Body:  # fmt: skip
-        """At rest with its origin at `foot`; `moment` is about its mass centre."""
+        """Body at rest at `origin`; `inertia` is about its mass centre `center`."""
         c, s = np.cos(angle), np.sin(angle)
         position = np.asarray(origin) + np.array([[c, -s], [s, c]]) @ center
         node = self.system.AddNode(NodeRigidBody2D(referenceCoordinates=[*position, angle]))

@@ -16,7 +16,7 @@ WEIGHTS = {"evaluations": 1.0, "residuals": 0.6, "tangents": 2.0, "solves": 1.0,
 
 
 def accurate_points(points: Iterable[Point], target: float) -> list[Point]:
-    """Points with an error of at most `target_error` (m) whose tighter settings meet it too."""
+    """Points with an error of at most `target` (m) whose tighter settings meet it too."""
     points_kept: list[Point] = []
     evaluated = [point for point in points if "error_m" in point]
     for point in sorted(evaluated, key=lambda p: float(p["tolerance"])):

@@ -400,7 +400,7 @@ def _own_or_composite(own: Nodes, composite: Nodes, entries: tuple[int, int, int
 
 
 def _with_entry(step: Step, letter: str, index: int) -> Step:
-    """Step with the entry `number` in place of "[k]", row `number` in place of "[6 * k]"."""
+    """Step with the entry `index` in place of "[k]", row `index` in place of "[6 * k]"."""
 
     def resolve(slot: str) -> str:
         name, _, entry = slot.partition("[")

@@ -62,7 +62,7 @@ def _is_local(slot: str) -> bool:
 
 
 def _derivative_steps(step: Step, reused: set[str]) -> Iterator[Step]:
-    """Derivative of a step, preceded by the step if it computes `wanted` local arrays."""
+    """Derivative of a step, preceded by the step if it computes `reused` local arrays."""
     if isinstance(step, Call):
         if any(slot in reused for _, slot in step.ports):
             yield step

@@ -24,7 +24,7 @@ def spanning_tree(mechanism: MechanismGraph) -> Tree:
     """Choose the spanning tree of least cost: for each body its inboard hinge.
 
     Hinges keep their direction.  The result is deterministic.  Raises ValueError where no tree
-    reaches every body; `obstacles` gives the reason.
+    reaches every body; `tree_problems` gives the reason.
     """
     starts = [breadth_first_tree(mechanism)]
     if all(len(holders) == 1 for holders in mechanism.holders):

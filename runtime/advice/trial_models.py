@@ -140,7 +140,7 @@ class TrialRunner:
         budget: time limit.
         runs: runs over the time span.
         compile: function that compiles a scene.
-        tell: callback with a sentence before every run.
+        report: callback with a sentence before every run.
         rtol: relative tolerance of trial runs.
         names: former names of bodies and ends -> names in the scene of the reference.
         reference: run of the richest model.

@@ -26,11 +26,11 @@ class ChartRecord:
         samples: number of times at which the error is evaluated.
         reference: reference solution that errors are relative to, and its own error.
         points: every run; see `Point`.
-        levels: model levels from the smallest to the richest, with their own errors.
-        left_out: methods and levels that were rejected, settings that were not run, and why.
-        wanted: target error of the recommended setting.
-        budget, spent: wall-clock time allowed and used, s.
-        looked: description of the times at which the error is evaluated.
+        model_levels: model levels from the smallest to the richest, with their own errors.
+        skipped: methods and levels that were rejected, settings that were not run, and why.
+        target_error: target error of the recommended setting.
+        budget, elapsed: wall-clock time allowed and used, s.
+        sampling_text: description of the times at which the error is evaluated.
         warnings: warnings of the scene, and those that every run of it gives.
     """
 

@@ -42,7 +42,7 @@ class CompiledScene:
         known: elements that are not prebuilt, by (kind, name).
         looped: looped engine on the packed scene.
         fusion: fused code of the scene.
-        closed: assembled closed loops; None for a tree.
+        loop_start: assembled closed loops; None for a tree.
         sweep: "riccati", "refined" or "qr".
     """
 

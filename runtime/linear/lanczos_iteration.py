@@ -85,9 +85,10 @@ class _Run:
     Attributes:
         q, p: vectors q_j and M q_j as rows.
         alpha, beta: diagonal and off-diagonal of the tridiagonal matrix.
-        values, shapes, pushed: 1/(omega^2 - sigma) of the modes found, shapes and M times them.
-        rest: start vector of the next run.
-        ended: whether no further vector, and no next run, exists.
+        values, shapes, mass_shapes: 1/(omega^2 - sigma) of the modes found, their shapes and M
+            times these.
+        next_start: start vector of the next run.
+        is_exhausted: whether no further vector, and no next run, exists.
     """
 
     def __init__(self, pencil: Pencil, known: ConvergedPairs, start: Array) -> None:

@@ -47,12 +47,12 @@ class LinearEquations(AssessedResult):
     Attributes:
         model: the compiled scene.
         state: operating point: t (s), q (nq,), u (nu,) and accelerations a (nu,).
-        controls, others: channels of v and w.
-        turning: (n, n) G of x' = G x + du, for coordinates that are not integrals of speeds; None
-            where x' = du.
-        about: linearisation by code compiled for the scene; None without such code.
-        mechanism: reduction of closed loops to independent speeds, to which x belong then; None
-            for a tree.
+        input_channels, disturbance_channels: channels of v and w.
+        rate_matrix: (n, n) G of x' = G x + du, for coordinates that are not integrals of speeds;
+            None where x' = du.
+        compiled_state: linearisation by code compiled for the scene; None without such code.
+        constrained_motion: reduction of closed loops to independent speeds, to which x belong
+            then; None for a tree.
         dry: friction of hinges that do not slide at the state, left out or replaced by viscous
             damping; None where the laws keep all friction.
         frame_transform: transformation of the increments of a spinning rotor to the fixed frame;

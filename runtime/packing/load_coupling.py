@@ -27,11 +27,11 @@ class LoadDependence:
 
     Attributes:
         loads, forces: whether each load or force element depends on its own body only.
-        placed: bodies with such loads, and all bodies inboard of them.
-        across: bodies with loads that depend on other bodies.
-        watched: for each body of `across`, the bodies on whose motion its loads depend.
+        own_load_bodies: bodies with such loads, and all bodies inboard of them.
+        coupled_bodies: bodies with loads that depend on other bodies.
+        load_sources: for each of `coupled_bodies`, the bodies on whose motion its loads depend.
         efforts: (value, speed) of each law effort that is an expression of the state.
-        heard: for each of `efforts`, the bodies whose coordinates and speeds it reads.
+        effort_sources: for each of `efforts`, the bodies whose coordinates and speeds it reads.
     """
 
     loads: tuple[bool, ...]

@@ -68,7 +68,7 @@ class PseudoTransientEquilibrium:
     def find(self, q: Array, tolerance: float) -> Array:
         """Find q (nq,) at rest, to `tolerance` times the characteristic scales, or to rounding.
 
-        Raises EquilibriumNotFoundError with the unbalanced efforts (nu,) after `most` steps.
+        Raises EquilibriumNotFoundError with the unbalanced efforts (nu,) after `max_steps` steps.
         """
         self.steps, q = 0, self.consistent_state(q)
         missing_efforts, is_near = self.stiffness.residual(q), False

@@ -65,11 +65,11 @@ class EquilibriumProblem:
     """Equilibrium problem in n coordinates.
 
     Attributes:
-        needed: q -> efforts (n,) required for equilibrium in the coordinates, N, N*m.
-        moved: q and a small motion (n,) -> q after the motion.
+        required_efforts: q -> efforts (n,) required for equilibrium in the coordinates, N, N*m.
+        move: q and a small motion (n,) -> q after the motion.
         sizes: (n,) characteristic scales of the coordinates: 1 rad, the length of a body; m, rad.
-        places: indices of the coordinates among the speeds of the scene.
-        there: q -> the same problem in coordinates that are independent at that q.
+        coordinate_indices: indices of the coordinates among the speeds of the scene.
+        problem_at: q -> the same problem in coordinates that are independent at that q.
     """
 
     required_efforts: Callable[[Array], Array]
@@ -249,7 +249,7 @@ def _line_search(
     """Line search: q after the step, the efforts there, and whether they have decreased.
 
     The step, limited to `_MAX_STEP`, is halved until its end is a valid state and the efforts
-    decrease or do not reverse.  If forces have a potential, `needed` is its gradient: a step that
+    decrease or do not reverse.  If forces have a potential, the required efforts are its gradient: a step that
     passes the minimum far reverses the gradient along it to more than half its size.  The efforts
     must also not grow much across a direction of little stiffness.
     """

@@ -47,7 +47,7 @@ def has_speed_rows(model: CompiledScene) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class RollingMechanism(ConstrainedLinearisation):
-    """Independent positions and speeds; `places` and `ways` P (nu, n) belong to the positions.
+    """Independent positions and speeds; the inherited indices and basis belong to the positions.
 
     Attributes:
         speed_indices: indices of the m independent speeds v.

@@ -48,7 +48,7 @@ class StickingFriction(NamedTuple):
         speed: index of the speed.
         coulomb, static: Coulomb and static friction (N or N*m).
         damping: equivalent viscous damping (N*s/m or N*m*s/rad).
-        given: whether an amplitude was given.
+        is_given: whether an amplitude was given.
     """
 
     speed: int

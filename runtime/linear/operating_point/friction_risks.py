@@ -76,8 +76,8 @@ class IndependentMotions:
     Attributes:
         names, units: names and units of increments.
         sizes: (n,) characteristic scales.
-        along: map from increments (n,) to all speeds (nu,).
-        onto: map from efforts (nu,) to efforts along the motions (n,).
+        to_speeds: map from increments (n,) to all speeds (nu,).
+        to_motion_efforts: map from efforts (nu,) to efforts along the motions (n,).
     """
 
     names: Sequence[str]

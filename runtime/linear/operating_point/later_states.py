@@ -45,8 +45,8 @@ class LaterStates:
     Drives and loads are those of the later times.
 
     Attributes:
-        every: all states; empty if nothing moves and nothing depends on time.
-        sparse: states at which matrices are compared.
+        all_states: all states; empty if nothing moves and nothing depends on time.
+        compared_states: states at which matrices are compared.
         driven: speed indices of the drives that move at the operating point.
     """
 

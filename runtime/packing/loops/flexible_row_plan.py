@@ -20,8 +20,8 @@ class FlexibleRowPlan:
     """Row plan in terms of bodies.
 
     Attributes:
-        rows, of, pairs, pending: as in `RowPlan`.
-        bent: flexible body -> rows that pass its modes, ascending.
+        rows, rows_by_group, pairs, pending: as in `RowPlan`.
+        modal_rows: flexible body -> rows that pass its modes, ascending.
     """
 
     def __init__(self, system: System, groups: Sequence[RowGroup]) -> None:

@@ -36,7 +36,7 @@ class RowPlan:
 
     Attributes:
         rows: in the order of their closure.
-        of: numbers of the rows of each group.
+        rows_by_group: numbers of the rows of each group.
         pending: body -> rows that pass its inboard hinge, ascending.
     """
 

@@ -45,12 +45,12 @@ class LoopRecords:
     """Records of closed loops.
 
     Attributes:
-        place: offset of their numbers in the workspace.
+        offset: offset of their numbers in the workspace.
         closures, couplings: in the order of the system.
-        of_bodies: records of the loops by body.
+        body_records: records of the loops by body.
         count: number of constraint rows.
         width: largest number of rows pending across a hinge.
-        chosen: rows that may be inactive because others are active instead.
+        optional_rows: rows that may be inactive because others are active instead.
     """
 
     def __init__(
