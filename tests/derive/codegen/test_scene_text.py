@@ -23,7 +23,7 @@ SMOOTH = [random_kernel(f"smooth{seed}", seed, 60, CONTINUOUS) for seed in SEEDS
 MIXED = [random_kernel(f"mixed{seed}", seed, 60) for seed in range(2)]
 
 
-def guarded() -> Any:
+def guarded_kernel() -> Any:
     """y = x0 x1; fails with 3 unless x0 < 1, with 4 unless x1 < 1, with 7 where x1 is zero."""
     graph = Graph()
     x = graph.vector("x", 2)
@@ -45,7 +45,7 @@ def lab(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
         if size:
             patch.setattr(scene_text, "MAX_UNSPLIT_SIZE", 0)
             patch.setattr(function_splitting, "PART_SIZE", size)
-        return FusedLab(folder, [*SMOOTH, *MIXED, guarded()], compiler)
+        return FusedLab(folder, [*SMOOTH, *MIXED, guarded_kernel()], compiler)
 
 
 @pytest.mark.parametrize("seed", SEEDS)

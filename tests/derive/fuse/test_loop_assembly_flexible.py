@@ -13,14 +13,14 @@ from tests.system.loops.test_flexible_against_particles import closed
 from tests.system.loops.test_flexible_against_tree import SCENES, shackled, slider_crank
 from tests.system.loops.test_flexible_constraints import ROWS, bladed
 
-from .test_loop_assembly import AGREEMENT, TIME, interpreted, settled
+from .test_loop_assembly import AGREEMENT, TIME, interpreted_outputs, start_state
 
 
 def agree(model: mstmm.Model, rng: np.random.Generator) -> None:
     """The accelerations of a state and those of IR with plain floats."""
     q, u = model.initial_state()
     u = u + rng.normal(scale=0.3, size=model.nu)
-    found, wanted = interpreted(model, q, u), model.accelerations(q, u, TIME)
+    found, wanted = interpreted_outputs(model, q, u), model.accelerations(q, u, TIME)
     assert worst(np.array(found["udot"]), wanted) < 1e-11
 
 
@@ -58,9 +58,9 @@ def test_loops_are_closed_alike(
     looped, fused = both
     q, u = looped.initial_state()
     near = q + away * rng.normal(size=looped.nq), u + away * rng.normal(size=looped.nu)
-    wanted = settled(looped, *near)
+    wanted = start_state(looped, *near)
     assert np.abs(wanted - np.concatenate(near)).max() > 0.1 * away
-    assert np.abs(settled(fused, *near) - wanted).max() < 10 * AGREEMENT
+    assert np.abs(start_state(fused, *near) - wanted).max() < 10 * AGREEMENT
 
 
 def test_runs_and_batches(both: tuple[mstmm.Model, mstmm.Model]) -> None:
