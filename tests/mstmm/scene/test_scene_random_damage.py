@@ -14,7 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from mstmm.errors import SceneError
 from mstmm.scene import Scene, load_scene
 from tests.fuzz.mutate import places
-from tests.mstmm.scene.tables.test_elastic import arrays, linked
+from tests.mstmm.scene.tables.test_elastic import arrays, link_scene
 from tests.reference.random_scenes import random_scene
 from tests.support.scenes.minimal import arm, beam, bladed, hinge
 
@@ -45,7 +45,7 @@ VALUES = st.recursive(
 )
 
 
-def damaged(data: dict[str, Any], draw: st.DataObject) -> dict[str, Any]:
+def damage_data(data: dict[str, Any], draw: st.DataObject) -> dict[str, Any]:
     """Replace, remove or add a few values."""
     data = copy.deepcopy(data)
     for _ in range(draw.draw(st.integers(1, 3))):
@@ -84,7 +84,7 @@ SLOW = (HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.function_s
 @settings(max_examples=150, deadline=None, suppress_health_check=SLOW)
 @given(st.data())
 def test_damaged_scenes(draw: st.DataObject) -> None:
-    data = damaged(arm(), draw)
+    data = damage_data(arm(), draw)
     check(lambda: Scene(**data))
 
 
@@ -95,7 +95,7 @@ def flexible() -> dict[str, Any]:
     divided = beam(mass_per_length=..., bending_stiffness=..., section=pieces, damping=[0.1] * 6,
                    frame="tangent@mid", ends={"mid": 5.0}, initial={"eta": [0.1] * 6})  # fmt: skip
     shaped = beam("flap", shapes={"y": ["(x/L)^2"]}, modes=..., rotary_inertia=1e-3)
-    link = linked(arrays(), name="tail", frame="tangent")["elastic"][0]
+    link = link_scene(arrays(), name="tail", frame="tangent")["elastic"][0]
     return bladed() | {
         "beam": [divided, shaped], "elastic": [link],
         "hinge": [
@@ -115,14 +115,14 @@ def test_the_flexible_scene_is_one() -> None:
 @settings(max_examples=100, deadline=None, suppress_health_check=SLOW)
 @given(st.data())
 def test_damaged_flexible_scenes(draw: st.DataObject) -> None:
-    data = damaged(flexible(), draw)
+    data = damage_data(flexible(), draw)
     check(lambda: Scene(**data))
 
 
 @settings(max_examples=60, deadline=None, suppress_health_check=SLOW)
 @given(st.integers(0, 2**32 - 1), st.data())
 def test_damaged_random_scenes(seed: int, draw: st.DataObject) -> None:
-    data = damaged(random_scene(seed, most=4, laws=False), draw)
+    data = damage_data(random_scene(seed, most=4, laws=False), draw)
     check(lambda: Scene(**data))
 
 

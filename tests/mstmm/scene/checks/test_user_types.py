@@ -83,14 +83,14 @@ BAD = [
 ]
 
 
-def coupled(expression: str) -> dict[str, Any]:
+def coupled_knee(expression: str) -> dict[str, Any]:
     return knee() | {"coupling": [{"expression": expression}]}
 
 
 def test_coordinates_of_a_type_that_is_not_known_yet_may_be_coupled() -> None:
-    Scene(**coupled("shoulder.q[0] - 2*shoulder.roll")).check_types(KNOWN)
+    Scene(**coupled_knee("shoulder.q[0] - 2*shoulder.roll")).check_types(KNOWN)
     with pytest.raises(SceneError, match="the last entry of hinge"):
-        Scene(**coupled("shoulder.q[2]")).check_types(KNOWN)
+        Scene(**coupled_knee("shoulder.q[2]")).check_types(KNOWN)
 
 
 @pytest.mark.parametrize(("data", "fragment"), BAD)
@@ -102,7 +102,7 @@ def test_what_does_not_fit_the_definition(data: dict[str, Any], fragment: str) -
     assert str(caught.value).startswith("arm.toml: ")
 
 
-def roped(**changes: Any) -> dict[str, Any]:
+def chain_scene(**changes: Any) -> dict[str, Any]:
     """A chain whose second body and hinge are of users' types."""
     own = {"type": "knee", "parameters": {"radius": 0.1}} | changes
     flywheel = {"type": "flywheel", "parameters": {"spin": 5}, "ends": {"tip": [1, 0, 0]}}
@@ -113,22 +113,31 @@ def roped(**changes: Any) -> dict[str, Any]:
 
 
 def test_user_types_in_chains() -> None:
-    Scene(**roped(law={"effort": ["q[1]", "radius"]})).check_types(KNOWN)
+    Scene(**chain_scene(law={"effort": ["q[1]", "radius"]})).check_types(KNOWN)
 
 
 @pytest.mark.parametrize(
     ("data", "fragment"),
     [
-        (roped(parameters={}), 'chain "rope": hinge[1].parameters.radius: missing; expected a num'),
-        (roped(type="kne"), 'chain "rope": hinge[1].type: unknown hinge type "kne"; did you'),
-        (roped(initial={"q": [1]}), "hinge[1].initial.q: expected 2 entries for knee, found 1"),
-        (roped(law={"effort": ["q[2]", 0]}), 'the last entry of hinge "rope[1].hinge" is [1]'),
         (
-            roped() | {"event": [{"when": "rope[3].hinge.u[2] > 1", "do": "stop"}]},
+            chain_scene(parameters={}),
+            'chain "rope": hinge[1].parameters.radius: missing; expected a num',
+        ),
+        (chain_scene(type="kne"), 'chain "rope": hinge[1].type: unknown hinge type "kne"; did you'),
+        (
+            chain_scene(initial={"q": [1]}),
+            "hinge[1].initial.q: expected 2 entries for knee, found 1",
+        ),
+        (
+            chain_scene(law={"effort": ["q[2]", 0]}),
+            'the last entry of hinge "rope[1].hinge" is [1]',
+        ),
+        (
+            chain_scene() | {"event": [{"when": "rope[3].hinge.u[2] > 1", "do": "stop"}]},
             "'rope[3].hinge.u[2]': the last entry of hinge \"rope[3].hinge\" is [1]",
         ),
         (
-            roped(law={"effort": ["rope[5].hinge.q", 0]}),
+            chain_scene(law={"effort": ["rope[5].hinge.q", 0]}),
             "write rope[5].hinge.q[0] to rope[5].hinge.q[1]",
         ),
     ],
@@ -138,7 +147,7 @@ def test_what_does_not_fit_in_a_chain(data: dict[str, Any], fragment: str) -> No
     with pytest.raises(SceneError) as caught:
         scene.check_types(KNOWN, "rope.toml")
     assert fragment in str(caught.value)
-    Scene(**roped()).check_types(KNOWN)
+    Scene(**chain_scene()).check_types(KNOWN)
 
 
 def test_check_against_looks_at_its_own_type_only() -> None:

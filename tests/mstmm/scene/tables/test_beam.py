@@ -74,7 +74,7 @@ do = "stop"
 """
 
 
-def warned(**changes: Any) -> tuple[str, ...]:
+def scene_warnings(**changes: Any) -> tuple[str, ...]:
     return Scene(**bladed(**changes)).warnings
 
 
@@ -258,7 +258,7 @@ def test_how_many_shapes_there_are_is_known_unless_a_frame_may_double_them(
 
 
 def test_no_warning_for_a_slender_beam_left_to_the_defaults() -> None:
-    assert warned(rotary_inertia=1e-4) == ()
+    assert scene_warnings(rotary_inertia=1e-4) == ()
 
 
 @pytest.mark.parametrize(
@@ -274,14 +274,14 @@ def test_no_warning_for_a_slender_beam_left_to_the_defaults() -> None:
     ],
 )
 def test_accepted_with_a_warning(changes: Data, fragment: str) -> None:
-    found = warned(**changes)
+    found = scene_warnings(**changes)
     assert len(found) == 1 and fragment in found[0]
 
 
 def test_height_counts_only_where_the_beam_bends() -> None:
     thick_along_z = {"rotary_inertia": [1.2 * 1.3**2 / 12, 1e-4]}
-    assert warned(modes={"z": 2}, **thick_along_z)
-    assert not warned(modes={"y": 2}, **thick_along_z)
+    assert scene_warnings(modes={"z": 2}, **thick_along_z)
+    assert not scene_warnings(modes={"y": 2}, **thick_along_z)
 
 
 PINNED: Data = {"type": "pin", "axis": [0, 0, 1]}

@@ -32,18 +32,18 @@ def pieces(*ranges: tuple[float, float], **changes: Any) -> Data:
     return bladed(section=section, mass_per_length=..., bending_stiffness=...)
 
 
-def shaped(shape: str, direction: str = "y", **changes: Any) -> Data:
+def shape_case(shape: str, direction: str = "y", **changes: Any) -> Data:
     return bladed(shapes={direction: [shape]}, modes=..., **changes)
 
 
-def loaded(load: Data, **changes: Any) -> Data:
+def load_case(load: Data, **changes: Any) -> Data:
     rod = {"name": "rod", "mass": 1.0, "inertia": [1, 1, 1]}
     grip = {"name": "grip", "type": "fixed", "inboard": "blade.tip", "outboard": "rod"}
     data = bladed(**changes)
     return data | {"body": [rod], "hinge": [*data["hinge"], grip], "load": [load]}
 
 
-def held(**changes: Any) -> Data:
+def hinge_case(**changes: Any) -> Data:
     """A beam on a hinge of another type."""
     hub = {"name": "hub", "type": "ball", "inboard": "ground", "outboard": "blade"} | changes
     return bladed() | {"hinge": [hub]}
@@ -111,23 +111,28 @@ BAD: list[tuple[Data, str]] = [
     (bladed(modes={"axial": 1}), "axial_stiffness: missing; axial shapes need it: expected E A"),
     (bladed(basis="clamped"), 'basis: expected "auto" or "clamped-free" or "free-free"'),
     (bladed(basis="given"), 'shapes: missing; basis = "given" needs shapes'),
-    (shaped("x^2", basis="free-free"), 'basis: expected "given" with shapes, found "free-free";'),
+    (shape_case("x^2", basis="free-free"),
+     'basis: expected "given" with shapes, found "free-free";'),
     (bladed(shapes={"y": ["x^2"]}, modes=3), "modes: shapes has y = 1, z = 0, twist = 0, axial ="),
     (bladed(shapes={}, modes=...), "modes: expected at least one shape, found none"),
     (bladed(shapes={"v": ["x"]}, modes=...), "shapes.v: unknown key"),
-    (shaped("t^2"), "shapes.y[0]: 't' is unknown; use one of x, L, pi"),
-    (shaped("x[0]^2"), "'x[0]' is unknown; use one of x, L, pi"),
-    (shaped("x^"), "shapes.y[0]: the expression ends where a value is expected"),
-    (shaped("x > 1"), "found a comparison; write where(x > 1, 1, 0)"),
-    (shaped("x"), "shapes.y[0]: the shape does not deform the beam; leave it out, the hinge gives"),
-    (shaped("0"), "the shape does not deform the beam"),
-    (shaped("1", "twist", torsional_stiffness=1, polar_inertia_per_length=1), "shapes.twist[0]:"),
-    (shaped("log(x)"), "the value, slope or curvature is not finite at x = 0 m; use a smooth"),
-    (shaped("x^1.5"), "the value, slope or curvature is not finite at x = 0 m"),
-    (shaped("sqrt(x)", "axial", axial_stiffness=1), "the value or slope is not finite at x = 0 m"),
-    (shaped("abs(x - 3)"), "the slope jumps along the beam; join the pieces smoothly"),
-    (shaped("where(x < 4.9, x^2, 1 + x^2*2)"), "the value jumps along the beam"),
-    (shaped("where(x < 5, 0, 1)", "axial", axial_stiffness=1), "the value jumps along the beam"),
+    (shape_case("t^2"), "shapes.y[0]: 't' is unknown; use one of x, L, pi"),
+    (shape_case("x[0]^2"), "'x[0]' is unknown; use one of x, L, pi"),
+    (shape_case("x^"), "shapes.y[0]: the expression ends where a value is expected"),
+    (shape_case("x > 1"), "found a comparison; write where(x > 1, 1, 0)"),
+    (shape_case("x"),
+     "shapes.y[0]: the shape does not deform the beam; leave it out, the hinge gives"),
+    (shape_case("0"), "the shape does not deform the beam"),
+    (shape_case("1", "twist", torsional_stiffness=1, polar_inertia_per_length=1),
+     "shapes.twist[0]:"),
+    (shape_case("log(x)"), "the value, slope or curvature is not finite at x = 0 m; use a smooth"),
+    (shape_case("x^1.5"), "the value, slope or curvature is not finite at x = 0 m"),
+    (shape_case("sqrt(x)", "axial", axial_stiffness=1),
+     "the value or slope is not finite at x = 0 m"),
+    (shape_case("abs(x - 3)"), "the slope jumps along the beam; join the pieces smoothly"),
+    (shape_case("where(x < 4.9, x^2, 1 + x^2*2)"), "the value jumps along the beam"),
+    (shape_case("where(x < 5, 0, 1)", "axial", axial_stiffness=1),
+     "the value jumps along the beam"),
     # frame, ends
     (bladed(frame="rigid"), 'frame: expected "auto", "tangent", "chord" or "mean" ("tangent@mid"'),
     (bladed(frame="tangent@mid"), 'frame: there is no end "mid"; use one of root, tip; define a'),
@@ -166,33 +171,40 @@ BAD: list[tuple[Data, str]] = [
     (arm(beam=[beam("elbow")]), '"elbow" is also the name of a hinge; rename one'),
     (bladed() | {"hinge": []}, 'beam "blade": no hinge connects it to the ground; add a hinge of'),
     (bladed() | {"beam": [beam(), beam("flap")]}, 'beam "flap": no hinge connects it to the'),
-    (held(outboard="blad"), 'outboard: there is no body "blad"; did you mean "blade"?'),
-    (held(outboard="blade.tp"), 'body "blade" has no end "tp"; did you mean "tip"?'),
-    (held(), "polar_inertia_per_length: missing; hinge \"hub\" allows the beam to spin about its"),
-    (held(type="free"), "which it has no inertia; expected rho I_p in kg m, more than 0, or"),
-    (held(type="pin", axis=[1, 0, 0]), "polar_inertia_per_length: missing"),
-    (held(type="fixed", release="t > 1"), "polar_inertia_per_length: missing"),
+    (hinge_case(outboard="blad"), 'outboard: there is no body "blad"; did you mean "blade"?'),
+    (hinge_case(outboard="blade.tp"), 'body "blade" has no end "tp"; did you mean "tip"?'),
+    (hinge_case(),
+     "polar_inertia_per_length: missing; hinge \"hub\" allows the beam to spin about its"),
+    (hinge_case(type="free"), "which it has no inertia; expected rho I_p in kg m, more than 0, or"),
+    (hinge_case(type="pin", axis=[1, 0, 0]), "polar_inertia_per_length: missing"),
+    (hinge_case(type="fixed", release="t > 1"), "polar_inertia_per_length: missing"),
     # loads per length and expressions
-    (loaded({"on": "rod", "force_per_length": [1, 0, 0]}), 'on: "rod" is no beam;'),
-    (loaded({"on": "blade.tip", "force_per_length": [1, 0, 0]}), "expected the name of a beam"),
-    (loaded({"on": "blad", "force_per_length": [1, 0, 0]}), 'no body "blad"; did you mean'),
-    (loaded({"on": "blade", "force_per_length": [1, 0]}), "three numbers or expressions in N/m"),
-    (loaded({"on": "blade", "force_per_length": [1, 0, 0], "force": [1, 0, 0]}), "write two loads"),
-    (loaded({"on": "blade", "force_per_length": ["x", 0, 0]}), "force_per_length[0]: 'x' is"),
-    (loaded({"on": "blade", "span": [0, 1]}), "span: only force_per_length acts on a span"),
-    (loaded({"on": "blade", "force_per_length": [1, 0, 0], "span": [3, 3]}), "with 0 <= from < to"),
-    (loaded({"on": "blade", "force_per_length": [1, 0, 0], "span": [-1, 3]}), "with 0 <= from <"),
-    (loaded({"on": "blade", "force_per_length": [1, 0, 0], "span": [3, 11]}),
+    (load_case({"on": "rod", "force_per_length": [1, 0, 0]}), 'on: "rod" is no beam;'),
+    (load_case({"on": "blade.tip", "force_per_length": [1, 0, 0]}), "expected the name of a beam"),
+    (load_case({"on": "blad", "force_per_length": [1, 0, 0]}), 'no body "blad"; did you mean'),
+    (load_case({"on": "blade", "force_per_length": [1, 0]}), "three numbers or expressions in N/m"),
+    (load_case({"on": "blade", "force_per_length": [1, 0, 0], "force": [1, 0, 0]}),
+     "write two loads"),
+    (load_case({"on": "blade", "force_per_length": ["x", 0, 0]}), "force_per_length[0]: 'x' is"),
+    (load_case({"on": "blade", "span": [0, 1]}), "span: only force_per_length acts on a span"),
+    (load_case({"on": "blade", "force_per_length": [1, 0, 0], "span": [3, 3]}),
+     "with 0 <= from < to"),
+    (load_case({"on": "blade", "force_per_length": [1, 0, 0], "span": [-1, 3]}),
+     "with 0 <= from <"),
+    (load_case({"on": "blade", "force_per_length": [1, 0, 0], "span": [3, 11]}),
      'expected a part of the beam "blade", 0 to 10 m, found [3, 11]'),
-    (loaded({"name": "mid", "on": "blade", "force_per_length": [1, 0, 0]}, ends={"mid": 5}),
+    (load_case({"name": "mid", "on": "blade", "force_per_length": [1, 0, 0]}, ends={"mid": 5}),
      '"mid" is also an end of the beam "blade"; rename the load'),
-    (loaded({"on": "rod", "force": ["blade.q", 0, 0]}), "flexible body \"blade\" has 6 entries;"),
-    (loaded({"on": "rod", "force": ["blade.q[6]", 0, 0]}), 'the last entry of flexible body'),
-    (loaded({"on": "rod", "force": ["blade.z1", 0, 0]}), "'blade.z1' is unknown; write blade.q[3]"),
-    (loaded({"on": "rod", "force": ["blade.q", 0, 0]}, modes="auto"), "give the index of the"),
-    (loaded({"on": "rod", "force": ["blade.eta[0]", 0, 0]}), "a flexible body has"),
-    (loaded({"on": "rod", "force": ["blade.tip.x", 0, 0]}), "are available only in events and"),
-    (loaded({"on": "rod", "axes": "blad"}), 'axes: there is no body "blad"; did you mean "blade"?'),
+    (load_case({"on": "rod", "force": ["blade.q", 0, 0]}),
+     "flexible body \"blade\" has 6 entries;"),
+    (load_case({"on": "rod", "force": ["blade.q[6]", 0, 0]}), 'the last entry of flexible body'),
+    (load_case({"on": "rod", "force": ["blade.z1", 0, 0]}),
+     "'blade.z1' is unknown; write blade.q[3]"),
+    (load_case({"on": "rod", "force": ["blade.q", 0, 0]}, modes="auto"), "give the index of the"),
+    (load_case({"on": "rod", "force": ["blade.eta[0]", 0, 0]}), "a flexible body has"),
+    (load_case({"on": "rod", "force": ["blade.tip.x", 0, 0]}), "are available only in events and"),
+    (load_case({"on": "rod", "axes": "blad"}),
+     'axes: there is no body "blad"; did you mean "blade"?'),
 ]  # fmt: skip
 
 
@@ -224,7 +236,7 @@ def test_the_most_shapes_are_accepted() -> None:
     {"type": "pin", "axis": [1, 0, 0], "law": {"inertia": 1.0}}, {"type": "planar"},
     {"type": "universal", "axis": [0, 1, 0], "axis2": [0, 0, 1]}])  # fmt: skip
 def test_beams_that_cannot_spin_freely_need_no_polar_inertia(changes: Data) -> None:
-    assert Scene(**held(**changes)).beam[0].sections[0].polar_inertia_per_length is None
+    assert Scene(**hinge_case(**changes)).beam[0].sections[0].polar_inertia_per_length is None
 
 
 def test_a_rigid_beam_needs_mass_alone() -> None:
