@@ -27,7 +27,7 @@ FOLDERS = {
 OFF = mujoco.mjtDisableBit.mjDSBL_CONSTRAINT | mujoco.mjtDisableBit.mjDSBL_ACTUATION
 
 
-def published() -> Iterator[Path]:
+def mjcf_files() -> Iterator[Path]:
     """Files that MuJoCo reads by themselves and in which something moves."""
     for package, folders in FOLDERS.items():
         for one in files(package) or ():
@@ -91,7 +91,8 @@ def differences(path: Path, rng: np.random.Generator) -> dict[str, float]:
 def test_published_robots_move_as_mujoco_has_them() -> None:
     rng = np.random.default_rng(16)
     found = {
-        path.relative_to(path.parents[2]).as_posix(): differences(path, rng) for path in published()
+        path.relative_to(path.parents[2]).as_posix(): differences(path, rng)
+        for path in mjcf_files()
     }
     assert len(found) >= 36
     far = {name: one for name, one in found.items() if not max(one.values()) < 1e-11}
@@ -101,7 +102,7 @@ def test_published_robots_move_as_mujoco_has_them() -> None:
 @pytest.mark.parametrize("name", ["cheetah.xml", "walker.xml", "pusher.xml"])
 def test_steps_of_rk4_are_mujocos(name: str, rng: np.random.Generator) -> None:
     """The same method with the same steps gives the same numbers, but for rounding."""
-    path, step, steps = next(path for path in published() if path.name == name), 1e-3, 200
+    path, step, steps = next(path for path in mjcf_files() if path.name == name), 1e-3, 200
     peer, one = bare(path), of_links(path)
     peer.opt.integrator, peer.opt.timestep = mujoco.mjtIntegrator.mjINT_RK4, step
     model = mstmm.compile(one.scene)
@@ -141,7 +142,7 @@ def test_exact_derivatives_are_the_slopes_of_mujocos_accelerations(
     name: str, rng: np.random.Generator
 ) -> None:
     """As near as its differences by two steps are to each other."""
-    path = next(path for path in published() if path.name == name)
+    path = next(path for path in mjcf_files() if path.name == name)
     peer, one = bare(path), of_links(path)
     model = mstmm.compile(one.scene)
     q, u, data, ours, theirs = states(one, model, peer, rng)

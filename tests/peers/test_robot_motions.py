@@ -28,7 +28,7 @@ def path_of(name: str) -> Path:
     return next(path for path in published() if path.name == name)
 
 
-def damped(name: str) -> Pair:
+def damped_pair(name: str) -> Pair:
     """A robot with the same damping at every joint, in a state that is drawn."""
     base = ROBOTS[name]
     one = imported(path_of(name), base)
@@ -59,7 +59,7 @@ def coordinate_rates(peer: Any, at: np.ndarray, speeds: np.ndarray) -> np.ndarra
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_pinocchio_in_dop853(name: str) -> None:
-    pair = damped(name)
+    pair = damped_pair(name)
     peer, n = pair.peer, pair.peer.nq
     joints = [peer.idx_vs[k] for k in range(1, peer.njoints) if peer.nvs[k] == 1]
 
@@ -108,7 +108,7 @@ def mujoco_of(name: str, step: float) -> Any:
 def test_mujocos_rk4_step_by_step(name: str) -> None:
     """The same method with the same steps gives the same numbers, but for rounding."""
     step, steps = 1e-3, 200
-    pair, peer = damped(name), mujoco_of(name, step)
+    pair, peer = damped_pair(name), mujoco_of(name, step)
     data = mujoco.MjData(peer)
     places = [pair.model.coordinate_layout.hinges[pair.one.joints[peer.joint(k).name]]
               for k in range(peer.njnt)]  # fmt: skip

@@ -22,7 +22,7 @@ MOST = 18
 LARGER = ("talos_reduced.urdf", "romeo_small.urdf", "g1_29dof_rev_1_0.urdf", "human.urdf")
 
 
-def compared(package: str) -> dict[str, dict[str, float]]:
+def package_differences(package: str) -> dict[str, dict[str, float]]:
     """Robot and base -> how far ours and Pinocchio's differ, in parts of the largest number; what
     solves with the mass matrix beside its condition."""
     return {
@@ -111,7 +111,7 @@ def frames(pair: Pair) -> float:
 def test_published_robots_move_as_pinocchio_has_them(
     package: str, robots: int, derived: int, larger: tuple[str, ...]
 ) -> None:
-    found = compared(package)
+    found = package_differences(package)
     far = {name: apart for name, apart in found.items() if not max(apart.values()) < 1e-11}
     assert far == {}
     assert len({name.split()[0] for name in found}) >= robots
