@@ -15,7 +15,7 @@ import mstmm
 from mstmm.scene.robots.mjcf import read_mjcf
 from mstmm.scene.robots.scene_from_robot import ImportedRobot, ImportOptions, scene_from_robot
 from tests.peers.test_robots import states
-from tests.support.peers.robot_pairs import apart, of_peers
+from tests.support.peers.robot_pairs import of_peers, relative_difference
 
 #: Folders of each package with whole robots.
 FOLDERS = {
@@ -69,13 +69,17 @@ def differences(path: Path, rng: np.random.Generator) -> dict[str, float]:
     both, whole = np.ix_(ours, ours), np.zeros((peer.nv, peer.nv))
     mujoco.mj_fullM(peer, data, whole)
     found = {
-        "accelerations": apart(model.accelerations(q, u)[ours], data.qacc[theirs]),
-        "mass matrix": apart(model.mass_matrix(q)[both], whole[np.ix_(theirs, theirs)]),
+        "accelerations": relative_difference(model.accelerations(q, u)[ours], data.qacc[theirs]),
+        "mass matrix": relative_difference(
+            model.mass_matrix(q)[both], whole[np.ix_(theirs, theirs)]
+        ),
     }
     udot, data.qacc[:] = np.zeros(model.nu), 0.0
     udot[ours] = data.qacc[theirs] = rng.uniform(-1, 1, len(ours))
     mujoco.mj_inverse(peer, data)
-    found["efforts"] = apart(model.inverse_dynamics(q, u, udot)[ours], data.qfrc_inverse[theirs])
+    found["efforts"] = relative_difference(
+        model.inverse_dynamics(q, u, udot)[ours], data.qfrc_inverse[theirs]
+    )
     for number in range(1, peer.nbody):
         name = peer.body(number).name
         of = one.links.get(f"{name}/frame", one.links.get(name, "ground"))
@@ -83,8 +87,8 @@ def differences(path: Path, rng: np.random.Generator) -> dict[str, float]:
             continue
         rows = np.zeros((6, peer.nv))
         mujoco.mj_jacBody(peer, data, rows[:3], rows[3:], number)
-        found[f"place of {name}"] = apart(model.positions(q, of), data.xpos[number])
-        found[f"J of {name}"] = apart(model.jacobian(q, of)[:, ours], rows[:, theirs])
+        found[f"place of {name}"] = relative_difference(model.positions(q, of), data.xpos[number])
+        found[f"J of {name}"] = relative_difference(model.jacobian(q, of)[:, ours], rows[:, theirs])
     return found
 
 
@@ -112,7 +116,7 @@ def test_steps_of_rk4_are_mujocos(name: str, rng: np.random.Generator) -> None:
     run = model.simulate(step * steps, "rk4", step, initial=(q, u))
     assert run.success and model.nq == model.nu == peer.nv == len(ours)
     for found, wanted in ((run.q, data.qpos), (run.u, data.qvel)):
-        assert apart(found[-1][ours], wanted[theirs]) < 1e-11
+        assert relative_difference(found[-1][ours], wanted[theirs]) < 1e-11
 
 
 #: Weights of a central difference of fourth order, at steps of these sizes.
@@ -149,9 +153,9 @@ def test_exact_derivatives_are_the_slopes_of_mujocos_accelerations(
     found, both = model.derivatives(q, u), np.ix_(ours, ours)
     for by, exact in (("q", found.q[both]), ("u", found.u[both])):
         rough, fine = (slopes(peer, data, theirs, by, step) for step in (2e-3, 1e-3))
-        between = apart(rough, fine)
+        between = relative_difference(rough, fine)
         assert between < 1e-8
-        assert apart(exact, fine) < max(1e-10, between)
+        assert relative_difference(exact, fine) < max(1e-10, between)
 
 
 FLAGS = """<mujoco><option><flag {}/></option><worldbody><body>

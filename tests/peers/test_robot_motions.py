@@ -13,7 +13,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import mstmm
-from tests.support.peers.robot_pairs import Pair, imported, published
+from tests.support.peers.robot_pairs import Pair, import_robot, urdf_files
 
 #: End of a robot's path, and what its root stands on.
 ROBOTS = {
@@ -25,13 +25,13 @@ DAMPING, T_END = 0.3, 0.5
 
 
 def path_of(name: str) -> Path:
-    return next(path for path in published() if path.name == name)
+    return next(path for path in urdf_files() if path.name == name)
 
 
 def damped_pair(name: str) -> Pair:
     """A robot with the same damping at every joint, in a state that is drawn."""
     base = ROBOTS[name]
-    one = imported(path_of(name), base)
+    one = import_robot(path_of(name), base)
     hinges = [
         hinge | {"law": {"damping": DAMPING}} if hinge["type"] in ("pin", "prismatic") else hinge
         for hinge in one.tables["hinge"]

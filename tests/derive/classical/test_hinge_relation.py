@@ -40,7 +40,7 @@ from tests.support.classical.dense_chain import (
     planar_body,
     random_body,
 )
-from tests.support.classical.sign_flips import Flip, flipped, flips, terms
+from tests.support.classical.sign_flips import Flip, flip_sign, flips, terms
 
 SPATIAL_BODY = kernel(body_spatial.derivation())
 PLANAR_BODY = kernel(body_planar.derivation())
@@ -372,7 +372,7 @@ def _free_alone(statement: HingeStatement, index: int) -> bool:
 def test_a_flipped_sign_in_a_hinge_premise_is_found(mutation: tuple[str, Flip]) -> None:
     name, flip = mutation
     statement = STATEMENTS[name]
-    changed = dataclasses.replace(statement, premises=flipped(statement.premises, flip))
+    changed = dataclasses.replace(statement, premises=flip_sign(statement.premises, flip))
     mutated = kernel(hinge_relation.derivation(changed))
     draws = np.random.default_rng(3)
     if name == "acceleration":

@@ -55,7 +55,7 @@ def test_one_state_and_lanes_stay_within_the_bound(seed: int, lab: FusedLab) -> 
     codes, rows = lab.side_by_side(kernel.name, states)
     assert not any(codes)
     for state, row in zip(states, rows, strict=True):
-        code, one = lab.one(kernel.name, state)
+        code, one = lab.evaluate_state(kernel.name, state)
         assert code == 0
         for name, bounds in rounding_bounds(kernel, state).items():
             for (value, bound), got, lane in zip(bounds, one[name], row[name], strict=True):
@@ -70,7 +70,7 @@ def test_kernels_with_jumps(kernel: Any, lab: FusedLab) -> None:
     states = [random_inputs(k) for k in range(lab.lanes)]
     _, rows = lab.side_by_side(kernel.name, states)
     for state, row in zip(states, rows, strict=True):
-        _, one = lab.one(kernel.name, state)
+        _, one = lab.evaluate_state(kernel.name, state)
         assert np.allclose(one["y"], row["y"], rtol=1e-12, atol=1e-12)
 
 
@@ -101,5 +101,5 @@ def test_guards_of_every_lane(lab: FusedLab) -> None:
         codes, rows = lab.side_by_side("guarded", [{"x": x} for x, _ in turned])
         assert codes == [code for _, code in turned]
         for (x, code), row in zip(turned, rows, strict=True):
-            assert lab.one("guarded", {"x": x})[0] == code
+            assert lab.evaluate_state("guarded", {"x": x})[0] == code
             assert code or row["y"][0] == x[0] * x[1]

@@ -9,7 +9,7 @@ import numpy as np
 import mstmm
 from tests.reference.compare import worst
 from tests.reference.random_couplings import random_coupled
-from tests.support.scenes.gears import Scene, coupled, inertia, pair, pin, planetary, wheel
+from tests.support.scenes.gears import Scene, coupled_model, inertia, pair, pin, planetary, wheel
 
 
 def _fused_model(model: mstmm.Model) -> mstmm.Model:
@@ -64,7 +64,7 @@ def test_trajectories_side_by_side_go_by_time() -> None:
 
 def test_what_parts_is_named() -> None:
     """At the start the drives at both ends agree, later they do not."""
-    model = coupled(
+    model = coupled_model(
         [wheel("a", 0.02), wheel("b", 0.3), wheel("c", 0.1)],
         [pin("A", "a", drive="t^2"), pin("B", "b"), pin("C", "c", drive="t^3")],
         {"name": "gear", "expression": "A.q + 3*B.q"},

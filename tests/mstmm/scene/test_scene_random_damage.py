@@ -16,7 +16,7 @@ from mstmm.scene import Scene, load_scene
 from tests.fuzz.mutate import places
 from tests.mstmm.scene.tables.test_elastic import arrays, link_scene
 from tests.reference.random_scenes import random_scene
-from tests.support.scenes.minimal import arm, beam, bladed, hinge
+from tests.support.scenes.minimal import arm, beam, blade_scene, hinge
 
 KEYS = (
     "name type mass inertia ends tip axis axis2 lead normal initial q u law drive release "
@@ -96,7 +96,7 @@ def flexible() -> dict[str, Any]:
                    frame="tangent@mid", ends={"mid": 5.0}, initial={"eta": [0.1] * 6})  # fmt: skip
     shaped = beam("flap", shapes={"y": ["(x/L)^2"]}, modes=..., rotary_inertia=1e-3)
     link = link_scene(arrays(), name="tail", frame="tangent")["elastic"][0]
-    return bladed() | {
+    return blade_scene() | {
         "beam": [divided, shaped], "elastic": [link],
         "hinge": [
             hinge("hub", outboard="blade"),

@@ -37,10 +37,10 @@ from mstmm.scene import (
     load_scene,
 )
 from mstmm.scene.validators.scalars_and_vectors import Table
-from tests.support.pages import Follow, page_text, shown
+from tests.support.pages import Follow, block_texts, page_text
 
 PAGE = "docs/reference/scene-format.md"
-BLOCKS = shown(PAGE, "toml")
+BLOCKS = block_texts(PAGE, "toml")
 FORMAT = page_text(PAGE)
 
 

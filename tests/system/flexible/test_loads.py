@@ -11,14 +11,14 @@ import mstmm
 from mstmm.errors import SceneError
 from mstmm.numerics.rotations import from_quaternion, from_rpy
 from mstmm.scene import Scene
-from tests.support.scenes.minimal import Data, bladed
+from tests.support.scenes.minimal import Data, blade_scene
 
 ETA = (0.1, -0.02, 0.08, 0.01)
 
 
 def bent(**parts: Any) -> Data:
     """A blade on a turned pin, bent in both planes at the start; its tip has axes of its own."""
-    data = bladed(
+    data = blade_scene(
         modes={"y": 2, "z": 2}, frame="tangent", initial={"eta": list(ETA)}, rotary_inertia=1e-3,
         ends={"tip": {"position": 10.0, "orientation": [0.3, 0.2, 1.0]}},
     )  # fmt: skip
@@ -86,7 +86,9 @@ def test_events_on_modal_coordinates_and_on_ends() -> None:
 
 
 def test_an_entry_beyond_the_shapes_that_auto_chose_is_refused() -> None:
-    data = bladed(modes="auto") | {"load": [{"on": "blade.tip", "force": ["blade.q[99]", 0, 0]}]}
+    data = blade_scene(modes="auto") | {
+        "load": [{"on": "blade.tip", "force": ["blade.q[99]", 0, 0]}]
+    }
     beyond = r"'blade\.q\[99\]': 'blade' has \d+ entries: [yz]1, [yz]2"
     with pytest.raises(SceneError, match=beyond):
         mstmm.compile(Scene(**data), engine="looped")

@@ -23,7 +23,7 @@ from scipy.spatial.transform import Rotation
 
 import mstmm
 from tests.support.paths import TESTS
-from tests.support.user_elements.lagrange import integrated
+from tests.support.user_elements.lagrange import lagrange_motion
 
 Array = NDArray[np.float64]
 Make = Callable[[str], None]
@@ -121,7 +121,7 @@ def test_hinge_moves_as_lagrange_says(name: str, motion: Any, compiled: Make) ->
     symbols = sp.symbols(f"q:{len(q)}", real=True)
     times = np.linspace(0.0, 1.5, 16)
     rotation, position = motion(*symbols)
-    expected = integrated(rotation, position, symbols, TENSOR, GRAVITY, (q, u), times)
+    expected = lagrange_motion(rotation, position, symbols, TENSOR, GRAVITY, (q, u), times)
     model = mstmm.compile(started(name))
     result = model.simulate(1.5, rtol=1e-11, atol=1e-13, output_times=times)
     assert result.success

@@ -10,7 +10,7 @@ import pytest
 from mstmm.errors import SceneError
 from mstmm.ir.element_spec import ElementSpec, Param
 from mstmm.scene import Scene, load_scene
-from tests.support.scenes.minimal import arm, body, changed, hinge, one
+from tests.support.scenes.minimal import arm, body, change_value, hinge, one_rod
 
 KNEE = ElementSpec(
     "hinge",
@@ -28,7 +28,7 @@ KNOWN = {(s.kind, s.name): s for s in (KNEE, OWN_SPEEDS, FLYWHEEL, ROPE)}
 
 
 def knee(**changes: Any) -> dict[str, Any]:
-    return one(**({"type": "knee", "parameters": {"radius": 0.1}} | changes))
+    return one_rod(**({"type": "knee", "parameters": {"radius": 0.1}} | changes))
 
 
 def test_a_user_type_is_kept_with_its_numbers() -> None:
@@ -62,18 +62,18 @@ BAD = [
     (knee(law={"damping": 1}), "one number cannot be used for efforts in N*m, N"),
     (knee(law={"effort": ["q[2]", 0]}), 'the last entry of hinge "shoulder" is [1]'),
     (knee(law={"effort": ["q", 0]}), "write q[0] to q[1]"),
-    (one(type="cardan", drive=["t", "t"]), "cardan cannot be driven: it has"),
-    (one(type="pinn"), 'unknown hinge type "pinn"; did you mean "pin"?'),
-    (one(type="kne"), 'unknown hinge type "kne"; did you mean "knee"?'),
-    (one(type="spring"), 'unknown hinge type "spring"'),
-    (one(type="Revolute"), 'unknown hinge type "Revolute"; use "pin"'),
-    (one(type="weld_joint"), 'unknown hinge type "weld_joint"; use "fixed"'),
+    (one_rod(type="cardan", drive=["t", "t"]), "cardan cannot be driven: it has"),
+    (one_rod(type="pinn"), 'unknown hinge type "pinn"; did you mean "pin"?'),
+    (one_rod(type="kne"), 'unknown hinge type "kne"; did you mean "knee"?'),
+    (one_rod(type="spring"), 'unknown hinge type "spring"'),
+    (one_rod(type="Revolute"), 'unknown hinge type "Revolute"; use "pin"'),
+    (one_rod(type="weld_joint"), 'unknown hinge type "weld_joint"; use "fixed"'),
     (
-        changed(one(), "body", 0, "type", to="rigidd"),
+        change_value(one_rod(), "body", 0, "type", to="rigidd"),
         'unknown body type "rigidd"; did you mean "rigid"?',
     ),
     (
-        one() | {"spring": [{"from": "ground", "to": "rod1", "type": "sprong"}]},
+        one_rod() | {"spring": [{"from": "ground", "to": "rod1", "type": "sprong"}]},
         'spring "spring1": type: unknown force type "sprong"; did you mean "spring"?',
     ),
     (
@@ -163,12 +163,12 @@ def test_keys_that_a_definition_does_not_read_are_refused() -> None:
             Scene(**knee(**{key: value})).check_types(KNOWN)
     with pytest.raises(SceneError, match=r'law: law belongs to type "spring"; use parameters'):
         rope = {"from": "ground", "to": "rod1", "type": "rope", "law": {"stiffness": 1}}
-        Scene(**one(), spring=[rope])
+        Scene(**one_rod(), spring=[rope])
 
 
 def test_loading_checks_types_when_they_are_known(tmp_path: Path) -> None:
     path = tmp_path / "arm.toml"
-    path.write_text(Scene(**one(type="pinn")).to_toml())
+    path.write_text(Scene(**one_rod(type="pinn")).to_toml())
     assert load_scene(path).hinge[0].type == "pinn"
     with pytest.raises(SceneError, match=r'arm\.toml: hinge "shoulder": type: unknown hinge type'):
         load_scene(path, known_types={})

@@ -11,7 +11,7 @@ import pytest
 
 from mstmm.errors import SceneError
 from mstmm.scene import Scene
-from tests.support.scenes.minimal import Data, beam, body, hinge, one
+from tests.support.scenes.minimal import Data, beam, body, hinge, one_rod
 
 
 def rod(constants: Any = None, **changes: Any) -> Data:
@@ -37,7 +37,7 @@ def reload_scene(scene: Scene) -> Scene:
     ],
 )
 def test_a_number_may_be_a_constant_expression(text: str, value: float) -> None:
-    scene = Scene.from_data(one(initial={"q": [text]}))
+    scene = Scene.from_data(one_rod(initial={"q": [text]}))
     assert scene.hinge[0].initial is not None and scene.hinge[0].initial.q is not None
     assert scene.hinge[0].initial.q[0] == pytest.approx(value, rel=4e-16)
     assert reload_scene(scene) == scene
@@ -76,7 +76,7 @@ def test_expressions_of_other_constants_are_other_expressions() -> None:
 
 
 def test_normalised_quaternions_keep_how_they_are_written() -> None:
-    data = one(orientation=[1, 0, 0, "half"])
+    data = one_rod(orientation=[1, 0, 0, "half"])
     scene = Scene.from_data({**data, "constants": {"half": 0.5}})
     length = math.hypot(1.0, 0.5)
     assert scene.hinge[0].orientation == pytest.approx((1 / length, 0, 0, 0.5 / length))
