@@ -33,7 +33,7 @@ def start(data: Data) -> tuple[Any, Any]:
     return model, model.accelerations(q, u, t=0.0)
 
 
-def turned(rotation: Any, force: list[float]) -> list[float]:
+def rotated_force(rotation: Any, force: list[float]) -> list[float]:
     vector: list[float] = (np.array(rotation) @ force).tolist()
     return vector
 
@@ -45,16 +45,16 @@ def test_a_force_in_body_axes_follows_the_loaded_section() -> None:
     model, with_follower = start(bent(load=[load]))
     seen = model.simulate(t_end=1e-3).orientation("blade.tip")[0]
     section = np.array(from_quaternion(seen)) @ np.array(from_rpy([0.3, 0.2, 1.0])).T
-    fixed = {"on": "blade.tip", "force": turned(section, force)}
+    fixed = {"on": "blade.tip", "force": rotated_force(section, force)}
     assert with_follower == pytest.approx(start(bent(load=[fixed]))[1], rel=1e-9)
-    along = {"on": "blade.tip", "force": turned(from_rpy([0, 0, 0.4]), force)}
+    along = {"on": "blade.tip", "force": rotated_force(from_rpy([0, 0, 0.4]), force)}
     assert with_follower != pytest.approx(start(bent(load=[along]))[1], rel=1e-3)
 
 
 def test_a_load_per_length_in_body_axes_follows_the_floating_frame() -> None:
     load = {"on": "blade", "force_per_length": [0.3, -0.2, 0.1], "axes": "body"}
     _, with_follower = start(bent(load=[load]))
-    fixed = load | {"force_per_length": turned(from_rpy([0, 0, 0.4]), [0.3, -0.2, 0.1])}
+    fixed = load | {"force_per_length": rotated_force(from_rpy([0, 0, 0.4]), [0.3, -0.2, 0.1])}
     for axes in ({"axes": "inertial"}, {}):
         same = {key: value for key, value in fixed.items() if key != "axes"} | axes
         assert with_follower == pytest.approx(start(bent(load=[same]))[1], rel=1e-9)
