@@ -62,10 +62,10 @@ def attributes_by_class() -> dict[str, set[str]]:
             re.findall(r"\w+", " ".join(map(ast.unparse, node.bases)))
         )
 
-    def inherited(name: str) -> set[str]:
-        return own[name].union(*(inherited(base) for base in bases[name] - {name} if base in own))
+    def with_bases(name: str) -> set[str]:
+        return own[name].union(*(with_bases(base) for base in bases[name] - {name} if base in own))
 
-    return {name: inherited(name) for name in own}
+    return {name: with_bases(name) for name in own}
 
 
 def stale_names() -> Iterator[str]:

@@ -105,7 +105,7 @@ def thread_parts(kind: str, bodies: int, slices: list[slice]) -> tuple[dict[str,
 
 
 def _subjects(tree: Any, model: Any, q: np.ndarray, u: np.ndarray) -> dict[str, native.Subject]:
-    subjects = {"mstmm one by one": mstmm_engines.fused(model, q, u)}
+    subjects = {"mstmm one by one": mstmm_engines.fused_subject(model, q, u)}
     flags, sines = {"O2": casadi_peer.FLAGS["O2"]}, ("", "libm", "libmvec8")
     for name, subject in casadi_peer.subjects(tree, q, u, False, flags, sines).items():
         subjects[f"casadi {name}"] = subject

@@ -19,7 +19,7 @@ class _Context(ctypes.Structure):
     ]  # fmt: skip
 
 
-def looped(model: mstmm.Model, q: np.ndarray, u: np.ndarray) -> native.Subject:
+def looped_subject(model: mstmm.Model, q: np.ndarray, u: np.ndarray) -> native.Subject:
     """Looped engine."""
     engine = model.looped
     ffi = engine.ffi
@@ -38,7 +38,7 @@ def looped(model: mstmm.Model, q: np.ndarray, u: np.ndarray) -> native.Subject:
     )  # fmt: skip
 
 
-def fused(model: mstmm.Model, q: np.ndarray, u: np.ndarray) -> native.Subject:
+def fused_subject(model: mstmm.Model, q: np.ndarray, u: np.ndarray) -> native.Subject:
     """Fused engine with run-time parameters."""
     library = model.fusion.library
     ffi = library.ffi

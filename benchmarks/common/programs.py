@@ -70,15 +70,15 @@ def scene_subjects(kind: str, bodies: int, with_integrators: bool = True) -> Sce
     subjects = SceneSubjects(kind, bodies, tree)
     looped = mstmm.compile(mstmm.Scene(**scene), engine="looped")
     reference = looped.accelerations(q, u)
-    subjects.subjects["mstmm looped"] = mstmm_engines.looped(looped, q, u)
+    subjects.subjects["mstmm looped"] = mstmm_engines.looped_subject(looped, q, u)
     if tree.nu <= LIMITS["casadi"]:
         subjects.exact_udot = long_double.accelerations(tree, q, u)
     if bodies <= LIMITS["mstmm fused"]:
         fused = mstmm.compile(mstmm.Scene(**scene), engine="fused")
-        subjects.subjects["mstmm fused"] = mstmm_engines.fused(fused, q, u)
+        subjects.subjects["mstmm fused"] = mstmm_engines.fused_subject(fused, q, u)
     if bodies <= 25:
         baked = mstmm.compile(mstmm.Scene(**scene), engine="fused", bake=True)
-        subjects.subjects["mstmm baked"] = mstmm_engines.fused(baked, q, u)
+        subjects.subjects["mstmm baked"] = mstmm_engines.fused_subject(baked, q, u)
     if tree.nu <= LIMITS["casadi"]:
         _add_casadi(subjects, q, u)
     if bodies <= LIMITS["pinocchio"]:

@@ -49,7 +49,7 @@ LINES: dict[str, dict[str, tuple[str, dict[str, Any]]]] = {
 BUILDERS = {
     "pendulum": motions.pendulum,
     "two pinned": motions.two_pinned,
-    "welded": motions.welded,
+    "welded": motions.welded_beams,
 }
 COUNTS = {"pendulum": range(1, 9), "two pinned": range(1, 7), "welded": range(1, 7)}
 
@@ -122,7 +122,7 @@ def frequency_errors() -> dict[str, Any]:
 def weightless_welded_beams(basis: str, n: int) -> scenes.Scene:
     """The welded beams at rest, without weight, in suitable frames."""
     frame_keys = {"frame": "chord"} if basis == "simply-supported" else {}
-    return {**motions.welded(basis, n, **frame_keys), "gravity": [0.0, 0.0, 0.0]}
+    return {**motions.welded_beams(basis, n, **frame_keys), "gravity": [0.0, 0.0, 0.0]}
 
 
 def main() -> None:

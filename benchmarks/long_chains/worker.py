@@ -59,7 +59,7 @@ def mstmm_looped(kind: str, n: int) -> dict[str, float]:
     q, u = model.initial_state()
     if kind == "pins":
         q = rng.uniform(-1, 1, q.shape)
-    subject = mstmm_engines.looped(model, q[None], rng.uniform(-1, 1, (1, len(u))))
+    subject = mstmm_engines.looped_subject(model, q[None], rng.uniform(-1, 1, (1, len(u))))
     value = evaluation_ms(lambda: subject.time(False, 1))
     run_s = measure.cpu_time(lambda: model.simulate(T_END, output_times=[T_END], **settings))
     return {"build_s": build_s, "evaluation_ms": value, "run_s_per_s": run_s / T_END,

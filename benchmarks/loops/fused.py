@@ -66,8 +66,8 @@ def timed_calls(name: str, scene: mstmm.Scene) -> dict[str, Callable[[], float]]
     q, u = random_states(looped)
     expected = looped.accelerations(q, u)
     lanes = mstmm_engines.Lanes(fused, q, u)
-    subjects = {"looped": mstmm_engines.looped(looped, q, u),
-                "fused": mstmm_engines.fused(fused, q, u)}  # fmt: skip
+    subjects = {"looped": mstmm_engines.looped_subject(looped, q, u),
+                "fused": mstmm_engines.fused_subject(fused, q, u)}  # fmt: skip
     lanes()
     for udot in (lanes.udot, *(subject.accelerations() for subject in subjects.values())):
         assert measure.relative_difference(udot, expected) < 1e-12, name

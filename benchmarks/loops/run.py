@@ -168,7 +168,7 @@ def platform_rows(rounds: int) -> list[dict[str, Any]]:
     model = mstmm.compile(platform(), engine="looped")
     fused = mstmm.compile(platform(), engine="fused")
     q, u = fused.initial_state()
-    subject = mstmm_engines.fused(fused, q[None], u[None])
+    subject = mstmm_engines.fused_subject(fused, q[None], u[None])
     count, work = 2000, {
         "mstmm": evaluations(model, 2000), "mstmm fused": lambda: subject.time(True, 2000)
     }  # fmt: skip

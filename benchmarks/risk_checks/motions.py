@@ -22,7 +22,7 @@ def log_uniform(rng: Rng, low: float, high: float) -> float:
 
 
 def rod_row(rng: Rng, count: int, law: Scene, first_law: Scene | None = None) -> Scene:
-    """Rods of different mass on pins in a row; `law` of all, `first_law` replaces parts of the first."""
+    """Rods of different mass on pins in a row; `first_law` overrides `law` for the first hinge."""
     bodies = [rod(f"rod{i}", mass=log_uniform(rng, 0.3, 3.0)) for i in range(count)]
     hinges = [
         {"name": f"pin{i}", "type": "pin", "outboard": f"rod{i}",

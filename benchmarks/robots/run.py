@@ -64,7 +64,7 @@ def native_work(name: str) -> tuple[Work, float]:
     tree = links.link_tree(_with_defaults(robot.imported_robot.tables))
     q, u = links.random_states(tree, 32)
     model = robot.model("fused")
-    subjects = {"accelerations in C": mstmm_engines.fused(model, q, u)}
+    subjects = {"accelerations in C": mstmm_engines.fused_subject(model, q, u)}
     for variant, subject in pinocchio_peer.subjects(tree, q, u).items():
         subjects[f"Pinocchio in C++ {variant}"] = subject
     expected = model.accelerations(q, u)

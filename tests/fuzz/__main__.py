@@ -67,7 +67,7 @@ def _replay(options: argparse.Namespace) -> int:
     worst = 0
     for path in options.replay:
         record = json.loads(path.read_text("utf-8"))
-        outcome = Campaign(0, limits, options.engine, None).one(
+        outcome = Campaign(0, limits, options.engine, None).scene_outcome(
             record.get("scene", record), record.get("turn")
         )
         print(f"{path.name}: {outcome.kind} {outcome.detail}")

@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from .mutate import Mutant, at, mutant, places
+from .mutate import Mutant, mutant, places, value_at
 from .seeds import Data
 from .trial import BAD, GOOD, HANG, Outcome
 from .worker import Limits, Worker
@@ -78,7 +78,7 @@ class Campaign:
                 for worker in workers:
                     worker.close()
 
-    def one(self, data: Any, turn: int | None = None) -> Outcome:
+    def scene_outcome(self, data: Any, turn: int | None = None) -> Outcome:
         """The outcome of one scene; `turn` as for `trial`."""
         with self._workers(1) as workers:
             return self._try(workers[0], data, turn)
@@ -127,7 +127,7 @@ def smaller(data: Any, try_: Callable[[Any], Outcome], kind: str, detail: str, e
         for place in sorted(places(data), key=len):
             attempt = copy.deepcopy(data)
             try:
-                inside = at(attempt, place[:-1])
+                inside = value_at(attempt, place[:-1])
                 del inside[place[-1]]
             except (KeyError, IndexError, TypeError):
                 continue  # gone with a part that was taken out before

@@ -44,7 +44,7 @@ def mutant(seed: int, index: int, of: str = "") -> Mutant:
     for _ in range(rng.choice((1, 1, 1, 1, 2, 2, 3))):
         here = places(data)
         if rng.random() < 0.5:
-            here = [place for place in here if _is_number(at(data, place))] or here
+            here = [place for place in here if _is_number(value_at(data, place))] or here
         if here:
             done.append(_change(data, rng.choice(here), rng))
     return Mutant(origin, data, tuple(done))
@@ -61,8 +61,8 @@ def places(data: Any, here: Place = ()) -> list[Place]:
     return found
 
 
-def at(data: Any, place: Place) -> Any:
-    """What lies at a place."""
+def value_at(data: Any, place: Place) -> Any:
+    """Value at a place."""
     for part in place:
         data = data[part]
     return data
@@ -70,7 +70,7 @@ def at(data: Any, place: Place) -> Any:
 
 def _change(data: Data, place: Place, rng: random.Random) -> str:
     """One change at a place, in the data; what it was, in words."""
-    inside, key = at(data, place[:-1]), place[-1]
+    inside, key = value_at(data, place[:-1]), place[-1]
     old = inside[key]
     roll = rng.random()
     if roll < 0.04:
@@ -81,7 +81,7 @@ def _change(data: Data, place: Place, rng: random.Random) -> str:
     elif roll < 0.12:
         new = _from_elsewhere(rng)
     else:
-        new = _changed(old, rng)
+        new = _mutate_value(old, rng)
     inside[key] = new
     return f"{_path((*place[:-1], key))}: {old!r:.80} -> {new!r:.80}"
 
@@ -94,7 +94,7 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
-def _changed(old: Any, rng: random.Random) -> Any:
+def _mutate_value(old: Any, rng: random.Random) -> Any:
     if isinstance(old, bool):
         return rng.choice((not old, 0, 1, "true", None))
     if isinstance(old, (int, float)):
@@ -150,8 +150,8 @@ def _list(old: list[Any], rng: random.Random) -> Any:
         lambda: [old],
         lambda: one,
         lambda: [one] * rng.choice((1, 2, 3, 4, 6, 7, 100)),
-        lambda: [_changed(x, rng) for x in old],
-        lambda: [_changed(x, rng) if rng.random() < 0.5 else x for x in old],
+        lambda: [_mutate_value(x, rng) for x in old],
+        lambda: [_mutate_value(x, rng) if rng.random() < 0.5 else x for x in old],
         lambda: [rng.choice(EXTREME) for _ in range(rng.choice((1, 2, 3, 3, 3, 6)))],
     ]
     return copy.deepcopy(rng.choice(kinds)())
@@ -170,7 +170,7 @@ def strings(data: Any) -> list[str]:
 def _from_elsewhere(rng: random.Random) -> Any:
     """Something out of another scene."""
     other = seeds()[rng.choice(sorted(seeds()))]
-    return copy.deepcopy(at(other, rng.choice(places(other))))
+    return copy.deepcopy(value_at(other, rng.choice(places(other))))
 
 
 def _other_key(rng: random.Random) -> tuple[str, Any]:
@@ -178,7 +178,7 @@ def _other_key(rng: random.Random) -> tuple[str, Any]:
     other = seeds()[rng.choice(sorted(seeds()))]
     named = [place for place in places(other) if isinstance(place[-1], str)]
     place = rng.choice(named)
-    return str(place[-1]), copy.deepcopy(at(other, place))
+    return str(place[-1]), copy.deepcopy(value_at(other, place))
 
 
 def expression(rng: random.Random) -> str:

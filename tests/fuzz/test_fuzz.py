@@ -73,10 +73,10 @@ def test_a_mutant_is_always_the_same_scene() -> None:
 
 
 @pytest.fixture
-def told(
+def outcome_of_defect(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> Iterator[Callable[[str, Limits], Outcome]]:
-    """What a worker says of a lawful scene in an mstmm with a defect where scenes are compiled."""
+    """Outcome of a valid scene in an mstmm with a defect where scenes are compiled."""
     workers = []
 
     def tell(defect: str, limits: Limits) -> Outcome:
@@ -100,9 +100,9 @@ DEFECTS = {
 
 
 @pytest.mark.parametrize("defect", DEFECTS)
-def test_a_defect_is_told(told: Callable[[str, Limits], Outcome], defect: str) -> None:
+def test_a_defect_is_told(outcome_of_defect: Callable[[str, Limits], Outcome], defect: str) -> None:
     kind, detail, limits = DEFECTS[defect]
-    outcome = told(defect, limits)
+    outcome = outcome_of_defect(defect, limits)
     assert outcome.kind == kind and detail in outcome.detail
 
 

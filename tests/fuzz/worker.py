@@ -56,7 +56,7 @@ class Worker:
             return Outcome(HANG, f"waits without computing ({self._phase()})")
         except (EOFError, OSError):
             self._process.join()
-            return self._died()
+            return self._exit_outcome()
 
     def close(self) -> None:
         """End the process."""
@@ -76,7 +76,7 @@ class Worker:
     def _phase(self) -> str:
         return self.phase.read_text() if self.phase.exists() else "?"
 
-    def _died(self) -> Outcome:
+    def _exit_outcome(self) -> Outcome:
         """How the process ended, told from its exit code and the stack that it left."""
         stack = self.stack.read_text() if self.stack.exists() else ""
         code = self._process.exitcode

@@ -30,8 +30,8 @@ T_END, STEPS = 0.2, 200
 NEWTON = 1e-9
 
 
-def closed(model: mstmm.Model, rng: np.random.Generator) -> tuple[Array, Array]:
-    """A pose beside the start, the crank turning."""
+def closed_state(model: mstmm.Model, rng: np.random.Generator) -> tuple[Array, Array]:
+    """An assembled state near the start, with a turning crank."""
     q, _ = model.initial_state()
     crank = np.zeros(model.nu)
     crank[0] = rng.uniform(1.0, 6.0)
@@ -50,7 +50,7 @@ def ends(scene: dict[str, Any], q: Array, u: Array, steps: int) -> Array:
 def test_exudyn_errs_by_its_own_error(what: str, draw: int) -> None:
     scene = SCENES[what]
     model = mstmm.compile(mstmm.Scene(**scene), engine="looped")
-    q, u = closed(model, np.random.default_rng(draw))
+    q, u = closed_state(model, np.random.default_rng(draw))
     run = model.simulate(T_END, rtol=1e-11, atol=1e-13, initial=(q, u), output_times=[0, T_END])
     assert run.success, run.message
     names = [body["name"] for body in scene["body"]]

@@ -15,7 +15,7 @@ import mstmm
 from mstmm.scene.robots.mjcf import read_mjcf
 from mstmm.scene.robots.scene_from_robot import ImportedRobot, ImportOptions, scene_from_robot
 from tests.peers.test_robots import states
-from tests.support.peers.robot_pairs import apart, of_peers
+from tests.support.peers.robot_pairs import of_peers, relative_difference
 
 #: Folders of each package with whole robots.
 FOLDERS = {
@@ -27,7 +27,7 @@ FOLDERS = {
 OFF = mujoco.mjtDisableBit.mjDSBL_CONSTRAINT | mujoco.mjtDisableBit.mjDSBL_ACTUATION
 
 
-def published() -> Iterator[Path]:
+def mjcf_files() -> Iterator[Path]:
     """Files that MuJoCo reads by themselves and in which something moves."""
     for package, folders in FOLDERS.items():
         for one in files(package) or ():
@@ -69,13 +69,17 @@ def differences(path: Path, rng: np.random.Generator) -> dict[str, float]:
     both, whole = np.ix_(ours, ours), np.zeros((peer.nv, peer.nv))
     mujoco.mj_fullM(peer, data, whole)
     found = {
-        "accelerations": apart(model.accelerations(q, u)[ours], data.qacc[theirs]),
-        "mass matrix": apart(model.mass_matrix(q)[both], whole[np.ix_(theirs, theirs)]),
+        "accelerations": relative_difference(model.accelerations(q, u)[ours], data.qacc[theirs]),
+        "mass matrix": relative_difference(
+            model.mass_matrix(q)[both], whole[np.ix_(theirs, theirs)]
+        ),
     }
     udot, data.qacc[:] = np.zeros(model.nu), 0.0
     udot[ours] = data.qacc[theirs] = rng.uniform(-1, 1, len(ours))
     mujoco.mj_inverse(peer, data)
-    found["efforts"] = apart(model.inverse_dynamics(q, u, udot)[ours], data.qfrc_inverse[theirs])
+    found["efforts"] = relative_difference(
+        model.inverse_dynamics(q, u, udot)[ours], data.qfrc_inverse[theirs]
+    )
     for number in range(1, peer.nbody):
         name = peer.body(number).name
         of = one.links.get(f"{name}/frame", one.links.get(name, "ground"))
@@ -83,15 +87,16 @@ def differences(path: Path, rng: np.random.Generator) -> dict[str, float]:
             continue
         rows = np.zeros((6, peer.nv))
         mujoco.mj_jacBody(peer, data, rows[:3], rows[3:], number)
-        found[f"place of {name}"] = apart(model.positions(q, of), data.xpos[number])
-        found[f"J of {name}"] = apart(model.jacobian(q, of)[:, ours], rows[:, theirs])
+        found[f"place of {name}"] = relative_difference(model.positions(q, of), data.xpos[number])
+        found[f"J of {name}"] = relative_difference(model.jacobian(q, of)[:, ours], rows[:, theirs])
     return found
 
 
 def test_published_robots_move_as_mujoco_has_them() -> None:
     rng = np.random.default_rng(16)
     found = {
-        path.relative_to(path.parents[2]).as_posix(): differences(path, rng) for path in published()
+        path.relative_to(path.parents[2]).as_posix(): differences(path, rng)
+        for path in mjcf_files()
     }
     assert len(found) >= 36
     far = {name: one for name, one in found.items() if not max(one.values()) < 1e-11}
@@ -101,7 +106,7 @@ def test_published_robots_move_as_mujoco_has_them() -> None:
 @pytest.mark.parametrize("name", ["cheetah.xml", "walker.xml", "pusher.xml"])
 def test_steps_of_rk4_are_mujocos(name: str, rng: np.random.Generator) -> None:
     """The same method with the same steps gives the same numbers, but for rounding."""
-    path, step, steps = next(path for path in published() if path.name == name), 1e-3, 200
+    path, step, steps = next(path for path in mjcf_files() if path.name == name), 1e-3, 200
     peer, one = bare(path), of_links(path)
     peer.opt.integrator, peer.opt.timestep = mujoco.mjtIntegrator.mjINT_RK4, step
     model = mstmm.compile(one.scene)
@@ -111,7 +116,7 @@ def test_steps_of_rk4_are_mujocos(name: str, rng: np.random.Generator) -> None:
     run = model.simulate(step * steps, "rk4", step, initial=(q, u))
     assert run.success and model.nq == model.nu == peer.nv == len(ours)
     for found, wanted in ((run.q, data.qpos), (run.u, data.qvel)):
-        assert apart(found[-1][ours], wanted[theirs]) < 1e-11
+        assert relative_difference(found[-1][ours], wanted[theirs]) < 1e-11
 
 
 #: Weights of a central difference of fourth order, at steps of these sizes.
@@ -141,16 +146,16 @@ def test_exact_derivatives_are_the_slopes_of_mujocos_accelerations(
     name: str, rng: np.random.Generator
 ) -> None:
     """As near as its differences by two steps are to each other."""
-    path = next(path for path in published() if path.name == name)
+    path = next(path for path in mjcf_files() if path.name == name)
     peer, one = bare(path), of_links(path)
     model = mstmm.compile(one.scene)
     q, u, data, ours, theirs = states(one, model, peer, rng)
     found, both = model.derivatives(q, u), np.ix_(ours, ours)
     for by, exact in (("q", found.q[both]), ("u", found.u[both])):
         rough, fine = (slopes(peer, data, theirs, by, step) for step in (2e-3, 1e-3))
-        between = apart(rough, fine)
+        between = relative_difference(rough, fine)
         assert between < 1e-8
-        assert apart(exact, fine) < max(1e-10, between)
+        assert relative_difference(exact, fine) < max(1e-10, between)
 
 
 FLAGS = """<mujoco><option><flag {}/></option><worldbody><body>

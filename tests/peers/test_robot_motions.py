@@ -13,7 +13,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import mstmm
-from tests.support.peers.robot_pairs import Pair, imported, published
+from tests.support.peers.robot_pairs import Pair, import_robot, urdf_files
 
 #: End of a robot's path, and what its root stands on.
 ROBOTS = {
@@ -25,13 +25,13 @@ DAMPING, T_END = 0.3, 0.5
 
 
 def path_of(name: str) -> Path:
-    return next(path for path in published() if path.name == name)
+    return next(path for path in urdf_files() if path.name == name)
 
 
-def damped(name: str) -> Pair:
+def damped_pair(name: str) -> Pair:
     """A robot with the same damping at every joint, in a state that is drawn."""
     base = ROBOTS[name]
-    one = imported(path_of(name), base)
+    one = import_robot(path_of(name), base)
     hinges = [
         hinge | {"law": {"damping": DAMPING}} if hinge["type"] in ("pin", "prismatic") else hinge
         for hinge in one.tables["hinge"]
@@ -59,7 +59,7 @@ def coordinate_rates(peer: Any, at: np.ndarray, speeds: np.ndarray) -> np.ndarra
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_pinocchio_in_dop853(name: str) -> None:
-    pair = damped(name)
+    pair = damped_pair(name)
     peer, n = pair.peer, pair.peer.nq
     joints = [peer.idx_vs[k] for k in range(1, peer.njoints) if peer.nvs[k] == 1]
 
@@ -108,7 +108,7 @@ def mujoco_of(name: str, step: float) -> Any:
 def test_mujocos_rk4_step_by_step(name: str) -> None:
     """The same method with the same steps gives the same numbers, but for rounding."""
     step, steps = 1e-3, 200
-    pair, peer = damped(name), mujoco_of(name, step)
+    pair, peer = damped_pair(name), mujoco_of(name, step)
     data = mujoco.MjData(peer)
     places = [pair.model.coordinate_layout.hinges[pair.one.joints[peer.joint(k).name]]
               for k in range(peer.njnt)]  # fmt: skip

@@ -14,7 +14,13 @@ import mstmm
 from mstmm.scene.robots.mjcf import read_mjcf
 from mstmm.scene.robots.scene_from_robot import ImportedRobot, ImportOptions, scene_from_robot
 from mstmm.scene.robots.unit_conversion import Units, convert_units
-from tests.support.peers.robot_pairs import Pair, apart, imported, pairs, published
+from tests.support.peers.robot_pairs import (
+    Pair,
+    import_robot,
+    pairs,
+    relative_difference,
+    urdf_files,
+)
 
 #: Speeds of robots whose derivatives are compared: those of larger ones take long to prepare, so of
 #: them a few stand for all.
@@ -22,7 +28,7 @@ MOST = 18
 LARGER = ("talos_reduced.urdf", "romeo_small.urdf", "g1_29dof_rev_1_0.urdf", "human.urdf")
 
 
-def compared(package: str) -> dict[str, dict[str, float]]:
+def package_differences(package: str) -> dict[str, dict[str, float]]:
     """Robot and base -> how far ours and Pinocchio's differ, in parts of the largest number; what
     solves with the mass matrix beside its condition."""
     return {
@@ -41,12 +47,16 @@ def differences(pair: Pair, rates_too: bool) -> dict[str, float]:
     asked = pin.rnea(peer, data, pair.at, pair.speeds, pair.speeds)[theirs]
     wanted = pin.aba(peer, data, pair.at, pair.speeds, pair.pushes)[theirs]
     return {
-        "accelerations": apart(model.accelerations(*given, efforts=pair.efforts)[ours], wanted)
+        "accelerations": relative_difference(
+            model.accelerations(*given, efforts=pair.efforts)[ours], wanted
+        )
         / solved,
-        "efforts": apart(model.inverse_dynamics(*given, rates)[ours], asked),
-        "mass matrix": apart(model.mass_matrix(pair.q)[np.ix_(ours, ours)], whole[both]),
+        "efforts": relative_difference(model.inverse_dynamics(*given, rates)[ours], asked),
+        "mass matrix": relative_difference(
+            model.mass_matrix(pair.q)[np.ix_(ours, ours)], whole[both]
+        ),
         "frames": frames(pair),
-        "bias": apart(
+        "bias": relative_difference(
             model.bias_efforts(*given)[ours],
             pin.nonLinearEffects(peer, data, pair.at, pair.speeds)[theirs],
         ),
@@ -72,9 +82,11 @@ def moving(pair: Pair) -> dict[str, float]:
         for found in (pin.getFrameJacobian, pin.getFrameJacobianTimeVariation)
     )
     return {
-        "gravity": apart(pair.model.gravity_efforts(pair.q)[ours], gravity),
-        "Jacobian": apart(pair.model.jacobian(pair.q, of)[:, ours], rows),
-        "its rate": apart(pair.model.jacobian_rate(pair.q, pair.u, of)[:, ours], rates),
+        "gravity": relative_difference(pair.model.gravity_efforts(pair.q)[ours], gravity),
+        "Jacobian": relative_difference(pair.model.jacobian(pair.q, of)[:, ours], rows),
+        "its rate": relative_difference(
+            pair.model.jacobian_rate(pair.q, pair.u, of)[:, ours], rates
+        ),
     }
 
 
@@ -84,7 +96,7 @@ def derivatives(pair: Pair) -> float:
     found = pair.model.derivatives(pair.q, pair.u, efforts=pair.efforts)
     ours, theirs = np.ix_(pair.ours, pair.ours), np.ix_(pair.theirs, pair.theirs)
     by_q, by_u = pair.data.ddq_dq[theirs], pair.data.ddq_dv[theirs]
-    return max(apart(found.q[ours], by_q), apart(found.u[ours], by_u))
+    return max(relative_difference(found.q[ours], by_q), relative_difference(found.u[ours], by_u))
 
 
 def frames(pair: Pair) -> float:
@@ -98,8 +110,8 @@ def frames(pair: Pair) -> float:
             turned = run.orientation(name)[0]
             turned = turned * np.sign(turned @ [w, x, y, z])
             worst = max(
-                worst, apart(run.position(name)[0], place.translation),
-                apart(turned, np.array([w, x, y, z])),
+                worst, relative_difference(run.position(name)[0], place.translation),
+                relative_difference(turned, np.array([w, x, y, z])),
             )  # fmt: skip
     return worst
 
@@ -111,7 +123,7 @@ def frames(pair: Pair) -> float:
 def test_published_robots_move_as_pinocchio_has_them(
     package: str, robots: int, derived: int, larger: tuple[str, ...]
 ) -> None:
-    found = compared(package)
+    found = package_differences(package)
     far = {name: apart for name, apart in found.items() if not max(apart.values()) < 1e-11}
     assert far == {}
     assert len({name.split()[0] for name in found}) >= robots
@@ -272,8 +284,8 @@ def test_what_mujoco_refuses_is_refused_in_one_message(tmp_path: Path) -> None:
 def test_others_read_what_is_exported(name: str, rng: np.random.Generator) -> None:
     """Pinocchio has the same accelerations from our file as from the published one; MuJoCo reads it
     too."""
-    path = next(path for path in published() if path.name == name)
-    text = mstmm.export_robot(imported(path, "fixed").scene).text
+    path = next(path for path in urdf_files() if path.name == name)
+    text = mstmm.export_robot(import_robot(path, "fixed").scene).text
     first, again = pin.buildModelFromUrdf(str(path)), pin.buildModelFromXML(text)
     q, v = pin.neutral(again), rng.uniform(-1, 1, again.nv)
     at = pin.neutral(first)

@@ -106,7 +106,7 @@ def speeds_of(hinge: Hinge, inner: Side, outer: Side) -> Jet | None:
     if kind == "fixed":
         return None
     spin = outer.omega - inner.omega
-    gap = apply(inner.frame.transposed, outer.point - inner.point)
+    gap = apply(inner.frame.transpose, outer.point - inner.point)
     slide = Jet(gap.dx, gap.ddx)
     a = apply(inner.frame, hinge.axis)
     about = dot(spin, a)[..., None]
@@ -121,12 +121,12 @@ def speeds_of(hinge: Hinge, inner: Side, outer: Side) -> Jet | None:
         e1, e2, _ = triad(hinge.axis, hinge.axis2).T
         return stack([dot(slide, e1), dot(slide, e2), about[..., 0]])
     if kind in ("ball", "free", "elastic"):
-        turn = apply(outer.frame.transposed, spin)
-        moving = apply(outer.frame.transposed, apply(inner.frame, slide))
+        turn = apply(outer.frame.transpose, spin)
+        moving = apply(outer.frame.transpose, apply(inner.frame, slide))
         return turn if kind == "ball" else join([moving, turn])
     if kind == "universal":
-        return _solved([a, apply(outer.frame, hinge.axis2)], spin)
-    return _solved(_gimbal_axes(inner, outer), spin)
+        return _axis_components([a, apply(outer.frame, hinge.axis2)], spin)
+    return _axis_components(_gimbal_axes(inner, outer), spin)
 
 
 def _gimbal_axes(inner: Side, outer: Side) -> list[Jet]:
@@ -140,7 +140,7 @@ def _gimbal_axes(inner: Side, outer: Side) -> list[Jet]:
     return [x, k / root[..., None], z]
 
 
-def _solved(axes: list[Jet], spin: Jet) -> Jet:
+def _axis_components(axes: list[Jet], spin: Jet) -> Jet:
     """Least-squares components of `spin` along the axes, with the first derivative."""
     basis = np.stack([a.x for a in axes], -1)
     rate = np.stack([a.dx for a in axes], -1)

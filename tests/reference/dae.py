@@ -120,7 +120,7 @@ class Equations:
             force += spread.T @ (effort - rotor * rows.bias)
             mass += spread.T @ (rotor[:, None] * spread)
             for i in np.flatnonzero(np.logical_not(free)).tolist():
-                asked = self._asked(hinge, i, q, rows.value[i], t)
+                asked = self._drive_acceleration(hinge, i, q, rows.value[i], t)
                 bound.add(hinge, spread[i : i + 1], np.array([asked - rows.bias[i]]))
         jacobian, m = np.vstack(bound.blocks), sum(len(b) for b in bound.blocks)
         system = np.block([[mass, jacobian.T], [jacobian, np.zeros((m, m))]])
@@ -133,7 +133,7 @@ class Equations:
             rates.reshape(n, 6), udot, q, u, -x[6 * n :], jacobian, bound.owners, moving, at
         )
 
-    def _asked(self, hinge: Hinge, i: int, q: Array, speed: float, t: float) -> float:
+    def _drive_acceleration(self, hinge: Hinge, i: int, q: Array, speed: float, t: float) -> float:
         """Acceleration of a driven speed, with the same stabilisation as the constraints."""
         value, slope, second = drive(hinge.drive[i], t)
         lag = 2 * self.baumgarte * (speed - slope) + self.baumgarte**2 * (q[hinge.q][i] - value)

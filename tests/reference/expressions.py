@@ -42,11 +42,11 @@ def evaluate(text: Any, scope: Mapping[str, Any], functions: Mapping[str, Any] =
     """Value of a number or expression; `scope` maps names (and `name.q`) to numbers or lists."""
     if not isinstance(text, str):
         return text
-    return _visit(_parsed(text), {**functions, **scope})
+    return _visit(_syntax_tree(text), {**functions, **scope})
 
 
 @lru_cache(maxsize=1000)
-def _parsed(text: str) -> ast.AST:
+def _syntax_tree(text: str) -> ast.AST:
     return ast.parse(text.replace("^", "**").strip(), mode="eval").body
 
 

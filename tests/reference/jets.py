@@ -64,7 +64,7 @@ class Jet:
         return self * chain(as_jet(other), lambda v: (1 / v, -1 / v**2, 2 / v**3))
 
     @property
-    def transposed(self) -> Jet:
+    def transpose(self) -> Jet:
         """Last two axes exchanged."""
         return Jet(*(np.swapaxes(part, -1, -2) for part in (self.x, self.dx, self.ddx)))
 

@@ -69,7 +69,7 @@ def _vector(frame: me.ReferenceFrame, v: Any) -> me.Vector:
     return x * frame.x + y * frame.y + z * frame.z
 
 
-def _turned(name: str, frame: me.ReferenceFrame, matrix: Array) -> me.ReferenceFrame:
+def _rotated_frame(name: str, frame: me.ReferenceFrame, matrix: Array) -> me.ReferenceFrame:
     """Frame whose axes are the columns of `matrix` in `frame`."""
     out = me.ReferenceFrame(name)
     out.orient_explicit(frame, sp.Matrix(3, 3, [_exact(v) for v in matrix.ravel()]))
@@ -77,7 +77,7 @@ def _turned(name: str, frame: me.ReferenceFrame, matrix: Array) -> me.ReferenceF
     return out
 
 
-def _moved(hinge: Hinge, frame: me.ReferenceFrame, q: Any, u: Any) -> tuple[Any, Any, Any]:
+def _hinge_motion(hinge: Hinge, frame: me.ReferenceFrame, q: Any, u: Any) -> tuple[Any, Any, Any]:
     """Frame of P and displacement of P from Q with its rate, in the hinge frame."""
     kind, axis = hinge.type, _vector(frame, hinge.axis)
     own, still = me.ReferenceFrame(f"P{hinge.name}"), me.Vector(0)
@@ -117,15 +117,15 @@ def _moved(hinge: Hinge, frame: me.ReferenceFrame, q: Any, u: Any) -> tuple[Any,
 def _hinge(tree: Tree, hinge: Hinge, model: _Model, q: Any, u: Any) -> None:
     own_q, own_u = list(q[hinge.q, 0]), list(u[hinge.u, 0])
     inner, name = model.frames[hinge.parent], hinge.name
-    frame = _turned(f"Q{name}", inner, hinge.Ro)
+    frame = _rotated_frame(f"Q{name}", inner, hinge.Ro)
     at_q = model.points[hinge.parent].locatenew(f"Q{name}", _vector(inner, hinge.ro))
     at_q.v2pt_theory(model.points[hinge.parent], model.inertial, inner)
-    outer, gap, rate = _moved(hinge, frame, own_q, own_u)
+    outer, gap, rate = _hinge_motion(hinge, frame, own_q, own_u)
     at_p = at_q.locatenew(f"P{name}", gap)
     spin = inner.ang_vel_in(model.inertial)
     at_p.set_vel(model.inertial, at_q.vel(model.inertial) + spin.cross(gap) + rate)
     body = tree.bodies[hinge.child]
-    axes = _turned(f"B{name}", outer, hinge.Rp.T)
+    axes = _rotated_frame(f"B{name}", outer, hinge.Rp.T)
     start = at_p.locatenew(f"I{name}", _vector(axes, -hinge.rp))
     center = at_p.locatenew(f"C{name}", _vector(axes, body.center - hinge.rp))
     for point in (start, center):

@@ -214,7 +214,7 @@ def solve(
 
 
 def _unpack(tree: Tree, system: _System, powers: list[Array]) -> Accelerations:
-    x = _refined(system.matrix, system.right)
+    x = _refined_solution(system.matrix, system.right)
     n, h = system.bodies, system.hinges
     bodies = x[: 6 * n].reshape(n, 6)
     wrenches = x[6 * n : 6 * (n + h)].reshape(h, 6)
@@ -229,7 +229,7 @@ def _unpack(tree: Tree, system: _System, powers: list[Array]) -> Accelerations:
     )
 
 
-def _refined(matrix: Array, right: Array) -> Array:
+def _refined_solution(matrix: Array, right: Array) -> Array:
     """Solution of an equilibrated system, refined with residuals in extended precision."""
     scale_c = 1.0 / np.abs(matrix).max(axis=0)
     scale_r = 1.0 / np.abs(matrix * scale_c).max(axis=1)

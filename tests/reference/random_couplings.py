@@ -26,7 +26,7 @@ def random_coupled(seed: int, most: int = 7) -> tuple[Scene, Array, Array]:
     scene["coupling"] = []
     for _ in range(6):
         tried = [*scene["coupling"], _coupling(rng, scene, tree, q)]
-        if len(tried) < 4 and _apart(tree, q, tried):
+        if len(tried) < 4 and _has_independent_rows(tree, q, tried):
             scene["coupling"] = tried
     return scene, q, _consistent(tree, q, u, scene["coupling"])
 
@@ -54,7 +54,7 @@ def _rows(tree: Tree, q: Array, drawn: list[Scene]) -> Array:
     return np.vstack([torn(tree, q), rows]) if len(tree.hinges) > len(tree.bodies) else rows
 
 
-def _apart(tree: Tree, q: Array, drawn: list[Scene]) -> bool:
+def _has_independent_rows(tree: Tree, q: Array, drawn: list[Scene]) -> bool:
     """Whether no row repeats others, or nearly, and freedoms are left."""
     rows = _rows(tree, q, drawn)
     shares = scipy.linalg.svdvals(rows)

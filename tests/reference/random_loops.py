@@ -107,7 +107,7 @@ def torn(tree: Tree, q: Array) -> Array:
     at = motion(tree, q, np.zeros(tree.nu))
     v, w = (np.zeros((len(tree.bodies) + 1, 3, tree.nu)) for _ in range(2))
 
-    def given(hinge: Hinge) -> tuple[Array, Array]:
+    def outboard_velocity(hinge: Hinge) -> tuple[Array, Array]:
         """Velocity and angular velocity of the outboard end, by the inboard body and the hinge."""
         rel = relative(hinge, q, np.zeros(tree.nu))
         frame, rates = at.A[hinge.parent] @ hinge.Ro, np.zeros((6, tree.nu))
@@ -117,11 +117,11 @@ def torn(tree: Tree, q: Array) -> Array:
         return speed, w[hinge.parent] + frame @ rates[3:]
 
     for hinge in (tree.hinges[number] for number in tree.order):
-        speed, w[hinge.child] = given(hinge)
+        speed, w[hinge.child] = outboard_velocity(hinge)
         v[hinge.child] = speed + tilde(at.A[hinge.child] @ hinge.rp) @ w[hinge.child]
     found = []
     for hinge in _closing(tree):
-        speed, spin = given(hinge)
+        speed, spin = outboard_velocity(hinge)
         own = v[hinge.child] - tilde(at.A[hinge.child] @ hinge.rp) @ w[hinge.child]
         found += [speed - own, spin - w[hinge.child]]
     return np.concatenate(found)

@@ -95,12 +95,12 @@ def _start(at: _Points) -> Rods:
         closed = [point(0, at.input), point(1, at.input) - point(0, at.output)]
         return np.concatenate([_balance(at, axes, w, a, wd, x[12:].reshape(2, 3)), *closed])
 
-    x = _solved(residual, np.zeros(18))
+    x = _newton_solution(residual, np.zeros(18))
     a, wd = x[:6].reshape(2, 3), x[6:12].reshape(2, 3)
     return Rods(r, v, a, a, axes, w, wd, wd)
 
 
-def _solved(residual: Callable[[Array], Array], x: Array) -> Array:
+def _newton_solution(residual: Callable[[Array], Array], x: Array) -> Array:
     for _ in range(12):
         jacobian = np.array(
             [(residual(x + d) - residual(x - d)) / 2e-6 for d in 1e-6 * np.eye(len(x))]
@@ -116,7 +116,7 @@ def _step(at: _Points, now: Rods, h: float, alpha_m: float, alpha_f: float) -> R
     gamma = 0.5 + alpha_f - alpha_m
     beta = (gamma + 0.5) ** 2 / 4
 
-    def moved(x: Array) -> Rods:
+    def advanced_rods(x: Array) -> Rods:
         aux = [x[:6].reshape(2, 3), x[6:12].reshape(2, 3)]
         rates = [
             ((1 - alpha_m) * new + alpha_m * old - alpha_f * rate) / (1 - alpha_f)
@@ -136,10 +136,10 @@ def _step(at: _Points, now: Rods, h: float, alpha_m: float, alpha_f: float) -> R
         )
 
     def residual(x: Array) -> Array:
-        then = moved(x)
+        then = advanced_rods(x)
         forces = x[12:].reshape(2, 3)
         balance = _balance(at, then.axes, then.w, then.a, then.wd, forces)
         return np.concatenate([balance, _closure(at, then.r, then.axes) / (beta * h * h)])
 
     start = np.concatenate([now.a.ravel(), now.wd.ravel(), np.zeros(6)])
-    return moved(_solved(residual, start))
+    return advanced_rods(_newton_solution(residual, start))

@@ -95,7 +95,7 @@ def blocks(text: str) -> Iterator[Block]:
         )
 
 
-def shown(page: str, language: str) -> list[str]:
+def block_texts(page: str, language: str) -> list[str]:
     """The texts of a page's blocks of a language."""
     return [block.text for block in blocks(page_text(page)) if block.language == language]
 

@@ -249,9 +249,9 @@ def _line_search(
     """Line search: q after the step, the efforts there, and whether they have decreased.
 
     The step, limited to `_MAX_STEP`, is halved until its end is a valid state and the efforts
-    decrease or do not reverse.  If forces have a potential, the required efforts are its gradient: a step that
-    passes the minimum far reverses the gradient along it to more than half its size.  The efforts
-    must also not grow much across a direction of little stiffness.
+    decrease or do not reverse.  If forces have a potential, the required efforts are its gradient:
+    a step that passes the minimum far reverses the gradient along it to more than half its size.
+    The efforts must also not grow much across a direction of little stiffness.
     """
     step = step / max(1.0, float(np.abs(step).max(initial=0.0)) / _MAX_STEP)
     size_before, work = _scaled_norm(residual, scale), abs(float(residual @ step))

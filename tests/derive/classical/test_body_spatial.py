@@ -22,7 +22,7 @@ from tests.support.classical.classical_kernels import (
     spatial_inputs,
 )
 from tests.support.classical.dense_chain import Body, output_state, planar_body, random_body
-from tests.support.classical.sign_flips import Flip, flipped, flips
+from tests.support.classical.sign_flips import Flip, flip_sign, flips
 
 SPATIAL_KERNEL = kernel(body_spatial.derivation())
 PLANAR_KERNEL = kernel(body_planar.derivation())
@@ -120,13 +120,13 @@ def test_premises_are_the_integrated_laws() -> None:
 
 @pytest.mark.parametrize("flip", flips(body_spatial.premises()), ids=str)
 def test_a_flipped_sign_in_the_spatial_premises_is_found(flip: Flip) -> None:
-    premises = flipped(body_spatial.premises(), flip)
+    premises = flip_sign(body_spatial.premises(), flip)
     assert _error(body_spatial.derivation(premises), random_body, spatial_inputs) > 1e-3
 
 
 @pytest.mark.parametrize("flip", flips(body_planar.premises()), ids=str)
 def test_a_flipped_sign_in_the_planar_premises_is_found(flip: Flip) -> None:
-    premises = flipped(body_planar.premises(), flip)
+    premises = flip_sign(body_planar.premises(), flip)
     assert _error(body_planar.derivation(premises), planar_body, planar_inputs) > 1e-3
 
 

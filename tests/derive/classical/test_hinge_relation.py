@@ -40,7 +40,7 @@ from tests.support.classical.dense_chain import (
     planar_body,
     random_body,
 )
-from tests.support.classical.sign_flips import Flip, flipped, flips, terms
+from tests.support.classical.sign_flips import Flip, flip_sign, flips, terms
 
 SPATIAL_BODY = kernel(body_spatial.derivation())
 PLANAR_BODY = kernel(body_planar.derivation())
@@ -94,7 +94,7 @@ def pin_chain_error(rng: np.random.Generator, count: int, hinge: KernelIR) -> fl
         )  # fmt: skip
         elements.append((matrix["U_h"], outboard["U"]))
     root = np.concatenate([axes[0], NONE])
-    found = _solved(elements, root[None, :], torques[:1])
+    found = _solve_chain(elements, root[None, :], torques[:1])
     return worst(found, accelerations(bodies, joints))
 
 
@@ -110,7 +110,7 @@ def ball_chain_error(rng: np.random.Generator, count: int, hinge: KernelIR) -> f
         outboard = run_precisely(SPATIAL_BODY, **spatial_inputs(body))
         matrix = run_precisely(hinge, **outboard, tau_n=torques[k + 1])
         elements.append((matrix["U_h"], outboard["U"]))
-    found = _solved(elements, np.hstack([np.eye(3), np.zeros((3, 3))]), torques[0])
+    found = _solve_chain(elements, np.hstack([np.eye(3), np.zeros((3, 3))]), torques[0])
     return worst(found, accelerations(bodies, joints))
 
 
@@ -125,7 +125,7 @@ def planar_chain_error(rng: np.random.Generator, count: int, hinge: KernelIR) ->
         outboard = run_precisely(PLANAR_BODY, **planar_inputs(body))
         matrix = run_precisely(hinge, **outboard, tau_n=torques[k + 1])
         elements.append((matrix["U_h"], outboard["U"]))
-    found = _solved(elements, np.array([[1.0, 0, 0]]), torques[:1])
+    found = _solve_chain(elements, np.array([[1.0, 0, 0]]), torques[:1])
     dense = [a[[0, 1, 5]] for a in accelerations(bodies, joints)]
     return worst(found, dense)
 
@@ -169,11 +169,11 @@ def acceleration_chain_error(
     at_root[3:, :3] = np.eye(3)
     at_root[:3, 3:] = np.eye(3)
     at_root[3:, 3:] = -np.column_stack([np.cross(offsets[0], e) for e in np.eye(3)])
-    found = _solved(elements, subspace(0).T @ at_root, efforts[0])
+    found = _solve_chain(elements, subspace(0).T @ at_root, efforts[0])
     return worst(found, accelerations(bodies, joints))
 
 
-def _solved(elements: list[tuple[object, object]], rows: Array, effort: Array) -> list[Array]:
+def _solve_chain(elements: list[tuple[object, object]], rows: Array, effort: Array) -> list[Array]:
     return chain_accelerations(elements, rows, [float(e) for e in effort])
 
 
@@ -220,7 +220,7 @@ def test_planar_acceleration_hinge_is_the_spatial_one(
         "d_n": rng.normal(size=3) * flat, "tau_n": rng.normal(size=len(free)),
     }  # fmt: skip
     outboard = run(SPATIAL_BODY, **spatial_inputs(body))
-    full = run(spatial, **outboard, **_of(spatial, values))["U_h"]
+    full = run(spatial, **outboard, **_kernel_inputs(spatial, values))["U_h"]
     small = {
         "A": axes[:2, :2], "d": values["d"][:2], "eta_v": values["eta_v"][:2],
         "eta_w": values["eta_w"][2], "A_n": next_axes[:2, :2], "d_n": values["d_n"][:2],
@@ -229,7 +229,7 @@ def test_planar_acceleration_hinge_is_the_spatial_one(
     if {"x", "y"} <= set(free):  # then planar efforts refer to inertial axes, spatial ones to A_n
         small["tau_n"] = np.append(next_axes[:2, :2] @ values["tau_n"][:2], values["tau_n"][2:])
     outboard = run(PLANAR_BODY, **planar_inputs(body))
-    part = run(planar, **outboard, **_of(planar, small))["U_h"]
+    part = run(planar, **outboard, **_kernel_inputs(planar, small))["U_h"]
     assert np.allclose(part, full[np.ix_(PLANAR_ROWS, PLANAR_ROWS)], rtol=1e-9, atol=1e-9)
 
 
@@ -238,7 +238,7 @@ def _turn(angle: float) -> Array:
     return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]])
 
 
-def _of(hinge: KernelIR, values: dict[str, Array]) -> dict[str, Array]:
+def _kernel_inputs(hinge: KernelIR, values: dict[str, Array]) -> dict[str, Array]:
     wanted = {port.name for port in hinge.inputs}
     return {name: value for name, value in values.items() if name in wanted}
 
@@ -372,7 +372,7 @@ def _free_alone(statement: HingeStatement, index: int) -> bool:
 def test_a_flipped_sign_in_a_hinge_premise_is_found(mutation: tuple[str, Flip]) -> None:
     name, flip = mutation
     statement = STATEMENTS[name]
-    changed = dataclasses.replace(statement, premises=flipped(statement.premises, flip))
+    changed = dataclasses.replace(statement, premises=flip_sign(statement.premises, flip))
     mutated = kernel(hinge_relation.derivation(changed))
     draws = np.random.default_rng(3)
     if name == "acceleration":
@@ -430,7 +430,7 @@ def _error_in_doubles(count: int) -> float:
     for u_h, u in rough:
         found.append((u_h @ state)[:3])
         state = u @ u_h @ state
-    return worst(found, _solved(exact, np.array([[1.0, 0, 0]]), np.zeros(1)))
+    return worst(found, _solve_chain(exact, np.array([[1.0, 0, 0]]), np.zeros(1)))
 
 
 def test_rounding_errors_of_the_product_grow_geometrically() -> None:

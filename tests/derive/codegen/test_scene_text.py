@@ -23,7 +23,7 @@ SMOOTH = [random_kernel(f"smooth{seed}", seed, 60, CONTINUOUS) for seed in SEEDS
 MIXED = [random_kernel(f"mixed{seed}", seed, 60) for seed in range(2)]
 
 
-def guarded() -> Any:
+def guarded_kernel() -> Any:
     """y = x0 x1; fails with 3 unless x0 < 1, with 4 unless x1 < 1, with 7 where x1 is zero."""
     graph = Graph()
     x = graph.vector("x", 2)
@@ -45,7 +45,7 @@ def lab(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
         if size:
             patch.setattr(scene_text, "MAX_UNSPLIT_SIZE", 0)
             patch.setattr(function_splitting, "PART_SIZE", size)
-        return FusedLab(folder, [*SMOOTH, *MIXED, guarded()], compiler)
+        return FusedLab(folder, [*SMOOTH, *MIXED, guarded_kernel()], compiler)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -55,7 +55,7 @@ def test_one_state_and_lanes_stay_within_the_bound(seed: int, lab: FusedLab) -> 
     codes, rows = lab.side_by_side(kernel.name, states)
     assert not any(codes)
     for state, row in zip(states, rows, strict=True):
-        code, one = lab.one(kernel.name, state)
+        code, one = lab.evaluate_state(kernel.name, state)
         assert code == 0
         for name, bounds in rounding_bounds(kernel, state).items():
             for (value, bound), got, lane in zip(bounds, one[name], row[name], strict=True):
@@ -70,7 +70,7 @@ def test_kernels_with_jumps(kernel: Any, lab: FusedLab) -> None:
     states = [random_inputs(k) for k in range(lab.lanes)]
     _, rows = lab.side_by_side(kernel.name, states)
     for state, row in zip(states, rows, strict=True):
-        _, one = lab.one(kernel.name, state)
+        _, one = lab.evaluate_state(kernel.name, state)
         assert np.allclose(one["y"], row["y"], rtol=1e-12, atol=1e-12)
 
 
@@ -101,5 +101,5 @@ def test_guards_of_every_lane(lab: FusedLab) -> None:
         codes, rows = lab.side_by_side("guarded", [{"x": x} for x, _ in turned])
         assert codes == [code for _, code in turned]
         for (x, code), row in zip(turned, rows, strict=True):
-            assert lab.one("guarded", {"x": x})[0] == code
+            assert lab.evaluate_state("guarded", {"x": x})[0] == code
             assert code or row["y"][0] == x[0] * x[1]

@@ -22,7 +22,7 @@ from tests.support.paths import ROOT
 GENERATED = ROOT / "generated"
 
 
-def turned(lanes: int) -> KernelIR:
+def rotation_kernel(lanes: int) -> KernelIR:
     """Rows of Y are R times those of X; Z gathers and takes off what is in Y."""
     graph = Graph()
     x, r = graph.matrix("X", 2, lanes), graph.matrix("R", 2, 2)
@@ -45,7 +45,7 @@ def test_pairs_are_the_straight_line(
     lanes: int, tmp_path: Path, rng: Generator, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Of an odd number the last entry comes alone; what stands behind the loops reads them."""
-    spec = element("drawn", turned(lanes))
+    spec = element("drawn", rotation_kernel(lanes))
     monkeypatch.setitem(VECTORIZED_OUTPUTS, ("drawn", "k"), (("Y", 1), ("Z", 0)))
     assert element_source(spec).count("for (int k = 0;") == 2
     library = build(tmp_path, spec)
@@ -65,20 +65,20 @@ def test_what_is_not_alike_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     branches, a guard."""
     monkeypatch.setitem(VECTORIZED_OUTPUTS, ("drawn", "k"), (("y", 0),))
 
-    def refused(words: str, spec: ElementSpec) -> None:
+    def expect_refusal(words: str, spec: ElementSpec) -> None:
         with pytest.raises(ValueError, match=words):
             element_source(spec)
 
     graph = Graph()
     x = graph.vector("x", 3)
-    refused("not computed alike", of_entries(graph, x[0] + x[2], x[1] * x[2]))
-    refused("not computed alike", of_entries(graph, 2 * x[0], 2 * x[2]))
-    refused("the same in every lane", of_entries(graph, x[0] * x[1], x[0] * x[1]))
-    refused(
+    expect_refusal("not computed alike", of_entries(graph, x[0] + x[2], x[1] * x[2]))
+    expect_refusal("not computed alike", of_entries(graph, 2 * x[0], 2 * x[2]))
+    expect_refusal("the same in every lane", of_entries(graph, x[0] * x[1], x[0] * x[1]))
+    expect_refusal(
         "not computed alike", of_entries(graph, graph.call("sin", x[0]), graph.call("sin", x[1]))
     )
     graph.guard(graph.call("lt", x[0], x[1]), 3, "in order")
-    refused("guard", of_entries(graph, 2 * x[0], 2 * x[1]))
+    expect_refusal("guard", of_entries(graph, 2 * x[0], 2 * x[1]))
 
 
 def test_kernels_that_are_printed_so_exist() -> None:

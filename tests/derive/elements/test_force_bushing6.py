@@ -34,7 +34,7 @@ def floating(name: str) -> Data:
     return {"name": f"{name}_hinge", "type": "free", "inboard": "ground", "outboard": name}
 
 
-def grounded(**bushing: Any) -> mstmm.Model:
+def grounded_model(**bushing: Any) -> mstmm.Model:
     """A body on a bushing to the ground."""
     return mstmm.compile(
         mstmm.Scene(
@@ -47,7 +47,7 @@ def grounded(**bushing: Any) -> mstmm.Model:
 @pytest.mark.parametrize("stiffness", [DIAGONAL, STIFFNESS.tolist()])
 def test_six_frequencies(stiffness: Any) -> None:
     """omega^2 of K - omega^2 M with both matrices at the mass centre."""
-    model = grounded(stiffness=stiffness)
+    model = grounded_model(stiffness=stiffness)
     found = np.sort(model.linearize(q=STILL, u=np.zeros(6)).modes().omega)
     matrix = np.diag(stiffness) if np.ndim(stiffness) == 1 else np.array(stiffness)
     known = np.sqrt(eigh(matrix, np.diag([MASS] * 3 + [*MOMENTS]), eigvals_only=True))
@@ -57,7 +57,7 @@ def test_six_frequencies(stiffness: Any) -> None:
 def test_large_turn_about_one_axis() -> None:
     """Its moment is stiffness times angle: J a'' + c a' + k a = 0 up to 2.9 rad."""
     k, c, start = 30.0, 0.4, 2.9
-    model = grounded(stiffness=DIAGONAL, damping=[0, 0, 0, 0, 0, c])
+    model = grounded_model(stiffness=DIAGONAL, damping=[0, 0, 0, 0, 0, c])
     q = [0.0, 0, 0, np.cos(start / 2), 0, 0, np.sin(start / 2)]
     times = np.linspace(0, 2, 21)
     result = model.simulate(2.0, rtol=1e-11, atol=1e-12, initial=(q, np.zeros(6)),
@@ -118,8 +118,8 @@ def potential(one: Pose, two: Pose) -> float:
     return float(bent @ STIFFNESS @ bent / 2 - bent @ np.array(BETWEEN["preload"]))
 
 
-def moved(pose: Pose, k: int, by: float) -> Pose:
-    """Along or about an axis of its own."""
+def displaced_pose(pose: Pose, k: int, by: float) -> Pose:
+    """The pose moved by `by` along or about its own axis k."""
     unit = by * np.eye(3)[k % 3]
     place, turn = pose
     if k < 3:
@@ -142,12 +142,12 @@ def accelerations(q: Array, u: Array) -> Array:
         for i in range(2)
     ]
 
-    def changed(i: int, k: int, by: float) -> list[Pose]:
-        return [moved(pose, k, by) if i == j else pose for j, pose in enumerate(poses)]
+    def displaced_poses(i: int, k: int, by: float) -> list[Pose]:
+        return [displaced_pose(pose, k, by) if i == j else pose for j, pose in enumerate(poses)]
 
     def along(i: int, k: int) -> Array:
         """Rate of x and relative angular velocity in the bushing's axes for a unit speed."""
-        rate: Array = difference(lambda h: deflection(*changed(i, k, h)))[:3]
+        rate: Array = difference(lambda h: deflection(*displaced_poses(i, k, h)))[:3]
         axes = poses[0][1] * _rpy(SIDES["one"][1]) * _rpy(BETWEEN["orientation"])
         spin = poses[i][1].apply(np.eye(3)[k - 3]) if k >= 3 else np.zeros(3)
         return np.concatenate([rate, axes.inv().apply(spin if i else -spin)])
@@ -155,7 +155,7 @@ def accelerations(q: Array, u: Array) -> Array:
     ways = np.array([along(i, k) for i in range(2) for k in range(6)])
 
     def pull(i: int, k: int) -> float:
-        return -float(difference(lambda h: potential(*changed(i, k, h))))
+        return -float(difference(lambda h: potential(*displaced_poses(i, k, h))))
 
     pulls = [pull(i, k) for i in range(2) for k in range(6)]
     load = (np.array(pulls) - ways @ DAMPING @ (ways.T @ u)).reshape(2, 2, 3)
@@ -204,17 +204,17 @@ def test_slopes_of_a_turned_bushing() -> None:
     q, u = np.array([0.1, 0.2, 0, 0.8, 0.6, 0, 0, 0, 0.3, 0, 0.96, 0, 0.28, 0]), np.zeros(12)
     linear = model.linearize(q=q, u=u)
 
-    def turned(k: int, h: float) -> Array:
+    def displaced_state(k: int, h: float) -> Array:
         """The state with a step along speed k, in axes of its own body."""
         i, own = divmod(k, 6)
         pose = (q[7 * i : 7 * i + 3], Rotation.from_quat(np.roll(q[7 * i + 3 : 7 * i + 7], -1)))
-        place, turn = moved(pose, own, h)
+        place, turn = displaced_pose(pose, own, h)
         return np.concatenate([q[: 7 * i], place, np.roll(turn.as_quat(), 1), q[7 * i + 7 :]])
 
     mass = np.array(([MASS] * 3 + [*MOMENTS]) * 2)
 
     def columns(k: int) -> tuple[Array, Array]:
-        pulls = difference(lambda h: accelerations(turned(k, h), u))
+        pulls = difference(lambda h: accelerations(displaced_state(k, h), u))
         damps = difference(lambda h: accelerations(q, u + h * np.eye(12)[k]))
         return -mass * pulls, -mass * damps
 
@@ -225,7 +225,7 @@ def test_slopes_of_a_turned_bushing() -> None:
 
 def test_a_stiff_method_takes_long_steps() -> None:
     """The slopes serve implicit methods: a mount that is far faster than the motion."""
-    model = grounded(stiffness=[1e8] * 3 + [10.0, 10, 10], damping=[1e6] * 3 + [1.0] * 3)
+    model = grounded_model(stiffness=[1e8] * 3 + [10.0, 10, 10], damping=[1e6] * 3 + [1.0] * 3)
     start = (STILL, [0.0, 0, 0, 1, 0, 0])
     runs = [model.simulate(0.3, method=m, rtol=1e-8, atol=1e-10, initial=start)
             for m in ("rodas5p", "dop853")]  # fmt: skip
@@ -236,7 +236,7 @@ def test_a_stiff_method_takes_long_steps() -> None:
 
 
 def test_turned_too_far() -> None:
-    model = grounded(stiffness=[1.0] * 6)
+    model = grounded_model(stiffness=[1.0] * 6)
     start = (STILL, [0.0, 0, 0, 0, 0, 30.0])
     result = model.simulate(1.0, initial=start)
     assert not result.success
@@ -247,7 +247,7 @@ def test_turned_too_far() -> None:
 def test_loss_factor() -> None:
     """x = 1 / (k (1 + i eta) - omega^2 m), about a place where the mount is bent."""
     k, eta, omega = DIAGONAL[0], 0.07, np.array([3.0, np.sqrt(DIAGONAL[0] / MASS), 90.0])
-    model = grounded(stiffness=DIAGONAL, preload=[50.0, 0, 0, 0, 0, 0])
+    model = grounded_model(stiffness=DIAGONAL, preload=[50.0, 0, 0, 0, 0, 0])
     found = model.frequency_response(
         omega, ["block.fx"], ["block.position.x"], structural={"mount": eta}
     )

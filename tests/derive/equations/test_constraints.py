@@ -44,7 +44,7 @@ KINDS = ("distance", "point-on-plane", "point-on-curve", "rolling", "ball")
 # --- random trees ---------------------------------------------------------------------------------
 
 
-def _asked(
+def _satisfied_constraint(
     kind: str, rng: np.random.Generator, between: Array, turned: Array
 ) -> tuple[Scene, Rows]:
     """A constraint that is met now, and its rows; `between` are the centres in axes of A, `turned`
@@ -75,7 +75,7 @@ def _drawn(
     a, b = sorted(int(k) for k in rng.permutation(len(tree.bodies) + 1)[:2] - 1)
     centers = [np.zeros(3) if k < 0 else at.point(k, tree.bodies[k].center) for k in (a, b)]
     between = at.A[a].T @ (centers[1] - centers[0])
-    row, told = _asked(kind, rng, between, at.A[a].T @ at.A[b])
+    row, told = _satisfied_constraint(kind, rng, between, at.A[a].T @ at.A[b])
     first = "ground" if a < 0 else f"{tree.bodies[a].name}.center"
     return row | {"from": first, "to": f"{tree.bodies[b].name}.center"}, (a, b, told)
 

@@ -108,7 +108,7 @@ def state(nu: int, numbers: random.Random) -> Values:
     return drawn | {"delta_I": some(6, numbers)}
 
 
-def factored(kernel: KernelIR, given: Values) -> Values:
+def factored_elimination(kernel: KernelIR, given: Values) -> Values:
     """S_Q, e_Q, udot and delta by way of the factored elimination."""
     names = {port.name for port in kernel.inputs}
     found = evaluate(kernel, {k: v for k, v in given.items() if k in names}, DIGITS)
@@ -134,7 +134,7 @@ def test_factored_elimination_of_any_subspace(nu: int) -> None:
     with mpmath.workdps(DIGITS):
         given = state(nu, numbers) | {"H": some(6 * nu, numbers)}
         given["J"] = [numbers.uniform(0.1, 1.0) for _ in range(nu)]
-        same(factored(GENERIC[nu]["eliminate"], given), full(given))
+        same(factored_elimination(GENERIC[nu]["eliminate"], given), full(given))
 
 
 @pytest.mark.parametrize("name", ["pin", "cylindrical", "ball", "free"])
@@ -152,7 +152,7 @@ def test_factored_elimination_of_unit_directions(name: str) -> None:
         for port in kernel.inputs:
             if port.name in ("p", "q"):
                 given[port.name] = some(port.length(), numbers)
-        same(factored(kernel, given), full(given))
+        same(factored_elimination(kernel, given), full(given))
 
 
 # --- turned axes --------------------------------------------------------------------------------

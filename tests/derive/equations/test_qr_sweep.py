@@ -146,7 +146,7 @@ def test_loads_of_a_body_by_its_rows() -> None:
             load = evaluate(kernels["bias_load"], {"p": p, "motion": motion}, DIGITS)["e"]
             U = evaluate(STEPS["factor"], {"S": S}, DIGITS)["U"]
             own = evaluate(STEPS["bias"], {"U": U, "motion": motion}, DIGITS)
-            found = restored(U, own["d"], own["e"])["e_S"]
+            found = riccati_form(U, own["d"], own["e"])["e_S"]
             gaps = [abs(a - b) for a, b in zip(found, load, strict=True)]
             assert max(gaps) < (1e-30 if min(moments) > 0 else 1e-13)  # rounding added to zeros
 
@@ -162,7 +162,7 @@ def across(nu: int, given: Values) -> Values:
     return {"G": found["G"], "g": found["g"]} | {name: merged[name] for name in ("U", "d", "e_I")}
 
 
-def restored(rows_of: Any, taken: Any, rest: Any) -> Values:
+def riccati_form(rows_of: Any, taken: Any, rest: Any) -> Values:
     return evaluate(STEPS["rows_to_riccati"], {"U": rows_of, "d": taken, "e": rest}, DIGITS)
 
 
@@ -184,14 +184,14 @@ def test_a_hinge_is_passed_as_by_the_riccati_sweep(
     }  # fmt: skip
     with mpmath.workdps(DIGITS):
         found = across(nu, given)
-        whole = restored(given["U"], given["d"], given["e"])
+        whole = riccati_form(given["U"], given["d"], given["e"])
         riccati = {name: given[name] for name in ("Rc", "r", "H", "J", "floor", "tau")}
         wanted = evaluate(
             GENERIC[nu]["condense"], riccati | {"S": whole["S"], "e": whole["e_S"]}, DIGITS
         )
         assert close(found["G"], wanted["G"]) and close(found["g"], wanted["g"])
-        parent = restored(given["U_P"], given["d_P"], [0] * 6)
-        after = restored(found["U"], found["d"], found["e_I"])
+        parent = riccati_form(given["U_P"], given["d_P"], [0] * 6)
+        after = riccati_form(found["U"], found["d"], found["e_I"])
         added = [a + b for a, b in zip(parent["S"], wanted["S_I"], strict=True)]
         loads = [a + b for a, b in zip(parent["e_S"], wanted["e_I"], strict=True)]
         assert close(after["S"], added) and close(after["e_S"], loads)

@@ -116,7 +116,9 @@ def test_motion_and_deviation_in_parts(seed: int) -> None:
 # --- structure ------------------------------------------------------------------------------------
 
 
-def traced(kernel: KernelIR, graph: Graph, known: dict[str, list[Node]]) -> dict[str, list[Node]]:
+def trace_kernel(
+    kernel: KernelIR, graph: Graph, known: dict[str, list[Node]]
+) -> dict[str, list[Node]]:
     """The kernel's outputs as nodes of `graph`, from nodes for its (flat) inputs."""
     numbers: dict[int, Node] = {}
 
@@ -150,7 +152,7 @@ def test_zeros_stay_zeros() -> None:
     zero = graph.constant(0)
     s = [zero if i in AFTER_PIN else node for i, node in enumerate(graph.vector("S", 21))]
     inputs = {"S": s, "e": graph.vector("e", 6), "turn": graph.vector("turn", 2)}
-    found = traced(SCREW["condense_z"], graph, inputs | {"d": graph.vector("d", 1)})
+    found = trace_kernel(SCREW["condense_z"], graph, inputs | {"d": graph.vector("d", 1)})
     assert [i for i, node in enumerate(found["S_I"]) if node.value == 0] == list(AFTER_PIN)
 
 
@@ -160,5 +162,5 @@ def test_right_angles_cost_nothing(axis: str, turn: tuple[int, int]) -> None:
     graph = Graph()
     inputs = {"S": graph.vector("S", 21), "e": graph.vector("e", 6), "d": [graph.constant(0)]}
     inputs["turn"] = [graph.constant(n) for n in turn]
-    found = traced(SCREW[f"condense_{axis}"], graph, inputs)
+    found = trace_kernel(SCREW[f"condense_{axis}"], graph, inputs)
     assert all(node.op in ("element", "neg") for row in found.values() for node in row)

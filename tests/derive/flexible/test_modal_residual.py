@@ -59,7 +59,7 @@ def _scalar(entry: sp.Expr, known: dict[str, sp.Matrix]) -> sp.Expr:
     return entry.xreplace({x: known[x.parent.name][int(x.i), int(x.j)] for x in entries})
 
 
-def _evaluated(derivation: Derivation, given: dict[str, sp.Matrix]) -> dict[str, sp.Matrix]:
+def _definition_values(derivation: Derivation, given: dict[str, sp.Matrix]) -> dict[str, sp.Matrix]:
     known = dict(given)
     for equation in derivation.at_size(N).definitions:
         known[equation.left.name] = _value(equation.right, known)
@@ -83,7 +83,9 @@ def test_residual_is_that_of_its_energy() -> None:
     data = _data()
     v, w, a, wd = (_explicit(name, 3, 1) for name in ("v", "w", "a", "wd"))
     eta, etad, etadd = (_explicit(name, N, 1) for name in ("eta", "etad", "etadd"))
-    found = _evaluated(modal_residual.momentum(), data | {"eta": eta, "etad": etad, "v": v, "w": w})
+    found = _definition_values(
+        modal_residual.momentum(), data | {"eta": eta, "etad": etad, "v": v, "w": w}
+    )
     energy = found["T"][0, 0]
     speeds = [*v, *w, *etad]
     momenta = sp.Matrix([energy.diff(x) for x in speeds])
@@ -103,7 +105,9 @@ def test_residual_is_that_of_its_energy() -> None:
         + data["D"] * etad,
     )
     motion = sp.Matrix([*w, *wd, *a])
-    own = _evaluated(modal_residual.residual(), data | {"eta": eta, "etad": etad, "motion": motion})
+    own = _definition_values(
+        modal_residual.residual(), data | {"eta": eta, "etad": etad, "motion": motion}
+    )
     stated = sp.Matrix.vstack(
         own["e"] + own["S_rf"] * etadd, own["e_f"] + own["S_rf"].T * sp.zeros(6, 1)
     )

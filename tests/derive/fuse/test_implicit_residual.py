@@ -134,7 +134,9 @@ def arm(n: int, stiffness: float = 1e5) -> Scene:
     }  # fmt: skip
 
 
-def by(engine: str, scene: Scene, method: str | mstmm.methods.Method, **options: Any) -> Result:
+def simulate_scene(
+    engine: str, scene: Scene, method: str | mstmm.methods.Method, **options: Any
+) -> Result:
     model = mstmm.compile(mstmm.Scene(**scene), engine=engine)
     return model.simulate(options.pop("t_end", 0.2), method=method, certify=False, **options)
 
@@ -142,7 +144,7 @@ def by(engine: str, scene: Scene, method: str | mstmm.methods.Method, **options:
 @pytest.mark.parametrize("method", ["rodas4p2", "kvaerno5", "genalpha", "exprb32"])
 def test_runs_equal_those_of_the_looped_engine(method: str) -> None:
     fused, looped = (
-        by(engine, arm(4), mstmm.methods.Implicit(method, tangent="exact"), step=2e-3)
+        simulate_scene(engine, arm(4), mstmm.methods.Implicit(method, tangent="exact"), step=2e-3)
         for engine in ("fused", "looped")
     )
     assert fused.success and looped.success
@@ -153,30 +155,30 @@ def test_runs_equal_those_of_the_looped_engine(method: str) -> None:
     assert fused.work == pytest.approx(looped.work, abs=1e-6)
 
 
-def offered(scene: Scene, engine: str = "fused", method: str = "genalpha") -> SceneSystem:
+def implicit_system(scene: Scene, engine: str = "fused", method: str = "genalpha") -> SceneSystem:
     """The system of a run that has stepped implicitly."""
     options = {"step": 2e-3} if method == "genalpha" else {"rtol": 1e-4, "atol": 1e-6}
     kept = list[SceneSystem]()
     offer = SceneSystem.offer_tangent
 
-    def noted(system: SceneSystem) -> None:
+    def record_system(system: SceneSystem) -> None:
         offer(system)
         kept.append(system)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(SceneSystem, "offer_tangent", noted)
-        assert by(engine, scene, method, **options).success
+        patch.setattr(SceneSystem, "offer_tangent", record_system)
+        assert simulate_scene(engine, scene, method, **options).success
     return kept[-1]
 
 
 def test_scenes_of_many_unknowns_stay_with_the_sweep() -> None:
-    assert offered(arm(4)).run.implicit_code.fused
-    assert not offered(arm(4), "looped").run.implicit_code.fused
-    assert not offered(arm(20)).run.implicit_code.fused
+    assert implicit_system(arm(4)).run.implicit_code.fused
+    assert not implicit_system(arm(4), "looped").run.implicit_code.fused
+    assert not implicit_system(arm(20)).run.implicit_code.fused
 
 
 def test_a_choice_among_methods_takes_the_code_once_it_steps_implicitly() -> None:
-    system = offered(arm(4, 1e9), method="auto")
+    system = implicit_system(arm(4, 1e9), method="auto")
     assert system.run.implicit_code.fused
 
 
@@ -196,6 +198,6 @@ def test_the_looped_engine_judges_pivots_that_are_not_positive() -> None:
     scene["body"], scene["hinge"], scene["load"] = scene["body"][:1], scene["hinge"][:1], []
     scene["hinge"][0].pop("law")
     options: Scene = {"step": 1.0, "t_end": 2.0, "initial": ([-1.57], [0.0])}
-    found = [by(engine, scene, "genalpha", **options) for engine in ("fused", "looped")]
+    found = [simulate_scene(engine, scene, "genalpha", **options) for engine in ("fused", "looped")]
     assert not found[0].success
     assert found[0].message == found[1].message and found[0].t[-1] == found[1].t[-1]

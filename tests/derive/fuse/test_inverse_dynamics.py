@@ -35,8 +35,8 @@ def beams() -> dict[str, Any]:
     }
 
 
-def replayed(model: mstmm.Model, q: Array, u: Array, a: Array) -> dict[str, Array]:
-    """What the kernels give."""
+def replay_kernels(model: mstmm.Model, q: Array, u: Array, a: Array) -> dict[str, Array]:
+    """Outputs of the kernels of inverse dynamics, evaluated in floats."""
     assert isinstance(model.fusion, Fusion)
     structure, p = structure_of(model.packed_scene.system, model.known or {})
     state: dict[str, Any] = {
@@ -56,7 +56,7 @@ def test_trees(seed: int, rng: Generator) -> None:
     model = mstmm.compile(mstmm.Scene(**scene), engine="looped")
     q, u = random_state(scene, seed)
     a = rng.normal(size=model.nu)
-    found = replayed(model, q, u, a)
+    found = replay_kernels(model, q, u, a)
     assert worst(found["required"], model.inverse_dynamics(q, u, a, TIME)) < 1e-11
     mass = model.mass_matrix(q)
     assert worst(found["M"].reshape(mass.shape), mass) < 1e-11
@@ -66,7 +66,7 @@ def test_flexible_bodies(rng: Generator) -> None:
     """Efforts of their speeds too; their mass matrix is the looped engine's affair."""
     model = mstmm.compile(mstmm.Scene(**beams()), engine="looped")
     q, u, a = (rng.uniform(-0.1, 0.1, n) for n in (model.nq, model.nu, model.nu))
-    found = replayed(model, q, u, a)
+    found = replay_kernels(model, q, u, a)
     assert list(found) == ["required"]
     assert worst(found["required"], model.inverse_dynamics(q, u, a, TIME)) < 1e-11
 

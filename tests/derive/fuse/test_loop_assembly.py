@@ -53,8 +53,8 @@ def driven(cut: str) -> Scene:
                               scene["hinge"][3]]}  # fmt: skip
 
 
-def interpreted(model: mstmm.Model, q: Any, u: Any) -> dict[str, Any]:
-    """Everything that the fused IR gives of a state, with plain floats."""
+def interpreted_outputs(model: mstmm.Model, q: Any, u: Any) -> dict[str, Any]:
+    """All outputs of the fused IR for a state, evaluated in floats."""
     packed = model.packed_scene
     structure, p = structure_of(packed.system, model.known or {}, floors=packed.floors)
     inputs = {
@@ -70,7 +70,7 @@ def test_interpreted_equals_looped(name: str, rng: np.random.Generator) -> None:
     model = looped_model(SCENES[name]())
     q, u = model.initial_state()
     u = u + rng.normal(scale=0.3, size=model.nu)
-    found, wanted = interpreted(model, q, u), model.accelerations(q, u, TIME)
+    found, wanted = interpreted_outputs(model, q, u), model.accelerations(q, u, TIME)
     inertial = float(np.abs(model.accelerations(q, 0.0 * u, TIME)).max())
     allowed = AGREEMENT * max(1.0, float(np.abs(wanted).max()), inertial)
     assert np.abs(np.array(found["udot"]) - wanted).max() < 10 * allowed
@@ -81,7 +81,7 @@ def test_random_mechanisms(seed: int) -> None:
     """All kinds of hinges in the tree and cut, with laws, rotors, springs and loads."""
     scene, q, u = random_mechanism(seed)
     model = looped_model(scene)
-    found, wanted = interpreted(model, q, u), model.accelerations(q, u, TIME)
+    found, wanted = interpreted_outputs(model, q, u), model.accelerations(q, u, TIME)
     assert worst(np.array(found["udot"]), wanted) < 1e-12
 
 
@@ -110,8 +110,8 @@ def test_compiled_equals_looped(
     assert np.abs(fused.accelerations(q, many[3]) - wanted[3]).max() < allowed
 
 
-def settled(model: mstmm.Model, q: Any, u: Any) -> Any:
-    """The state as a run begins with it."""
+def start_state(model: mstmm.Model, q: Any, u: Any) -> Any:
+    """State with which a run from q and u begins."""
     f = model.fusion
     code = None
     if f.library is not None:
@@ -126,9 +126,9 @@ def test_loops_are_closed_alike(
     looped, fused = both
     q, u = looped.initial_state()
     near = q + away * rng.normal(size=looped.nq), u + away * rng.normal(size=looped.nu)
-    wanted = settled(looped, *near)
+    wanted = start_state(looped, *near)
     assert np.abs(wanted - np.concatenate(near)).max() > 0.1 * away
-    assert np.abs(settled(fused, *near) - wanted).max() < AGREEMENT
+    assert np.abs(start_state(fused, *near) - wanted).max() < AGREEMENT
 
 
 def test_runs_sessions_and_batches(both: tuple[mstmm.Model, mstmm.Model]) -> None:
@@ -176,7 +176,7 @@ def test_power_of_drives(cut: str) -> None:
     """What a drive needs contains what the rows of a cut hinge carry."""
     model = looped_model(driven(cut))
     begun = model.simulate(TIME, t_start=TIME, initial=model.initial_state())
-    found = interpreted(model, begun.q[0], begun.u[0])
+    found = interpreted_outputs(model, begun.q[0], begun.u[0])
     wanted = begun.power()[0]
     assert abs(wanted) > 0.1
     assert abs(found["power"][0] - wanted) < 1e-12 * abs(wanted)

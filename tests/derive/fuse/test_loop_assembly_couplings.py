@@ -9,10 +9,10 @@ import numpy as np
 import mstmm
 from tests.reference.compare import worst
 from tests.reference.random_couplings import random_coupled
-from tests.support.scenes.gears import Scene, coupled, inertia, pair, pin, planetary, wheel
+from tests.support.scenes.gears import Scene, coupled_model, inertia, pair, pin, planetary, wheel
 
 
-def _fused(model: mstmm.Model) -> mstmm.Model:
+def _fused_model(model: mstmm.Model) -> mstmm.Model:
     return mstmm.compile(model.scene, engine="fused")
 
 
@@ -20,7 +20,7 @@ def test_a_mechanism() -> None:
     """Rows of speeds that name a hinge which closes a loop, a free body and a ball among them."""
     scene, q, u = random_coupled(6)
     looped = mstmm.compile(mstmm.Scene(**copy.deepcopy(scene)))
-    fused = _fused(looped)
+    fused = _fused_model(looped)
     assert fused.engine == "fused"
     assert worst(fused.accelerations(q, u), looped.accelerations(q, u)) < 1e-11
     run: Scene = {"rtol": 1e-9, "initial": (q, u), "output_times": [0.0, 0.2]}
@@ -32,7 +32,7 @@ def test_a_mechanism() -> None:
 
 def test_trajectories_side_by_side() -> None:
     """Redundant rows of planets; each trajectory is that of a run alone."""
-    model = _fused(planetary({}, sun={"stiffness": 3.0}, carrier={"stiffness": 20.0}))
+    model = _fused_model(planetary({}, sun={"stiffness": 3.0}, carrier={"stiffness": 20.0}))
     starts = [
         model.assemble([angle, 0, 0.1, 0, 0, 0], np.zeros(6), hold=["sun", "carrier"])
         for angle in (0.1, 0.2, 0.3)
@@ -47,7 +47,9 @@ def test_trajectories_side_by_side() -> None:
 
 def test_trajectories_side_by_side_go_by_time() -> None:
     """What a coupling asks for at each time, shared out by the moments of inertia: closed form."""
-    model = _fused(pair({"name": "gear", "expression": "A.q + 3*B.q", "equals": "0.2*sin(3*t)"}))
+    model = _fused_model(
+        pair({"name": "gear", "expression": "A.q + 3*B.q", "equals": "0.2*sin(3*t)"})
+    )
     times = np.linspace(0.25, 1.0, 4)
     asked, rate = 0.2 * np.sin(3 * times), 0.6 * np.cos(3 * times)
     q, u = np.array([0.0, asked[0] / 3]), np.array([0.1, (rate[0] - 0.1) / 3])
@@ -62,13 +64,13 @@ def test_trajectories_side_by_side_go_by_time() -> None:
 
 def test_what_parts_is_named() -> None:
     """At the start the drives at both ends agree, later they do not."""
-    model = coupled(
+    model = coupled_model(
         [wheel("a", 0.02), wheel("b", 0.3), wheel("c", 0.1)],
         [pin("A", "a", drive="t^2"), pin("B", "b"), pin("C", "c", drive="t^3")],
         {"name": "gear", "expression": "A.q + 3*B.q"},
         {"name": "belt", "expression": "B.q - C.q"},
     )
-    result = _fused(model).simulate(1.0, "dop853")
+    result = _fused_model(model).simulate(1.0, "dop853")
     assert not result.success and 'coupling "belt" at t = ' in result.message
 
 

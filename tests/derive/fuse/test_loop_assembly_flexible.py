@@ -9,18 +9,18 @@ import mstmm
 from tests.reference.compare import worst
 from tests.reference.flexible import random_beams
 from tests.support.models import compile_scene, looped_model
-from tests.system.loops.test_flexible_against_particles import closed
-from tests.system.loops.test_flexible_against_tree import SCENES, shackled, slider_crank
-from tests.system.loops.test_flexible_constraints import ROWS, bladed
+from tests.system.loops.test_flexible_against_particles import closed_scene
+from tests.system.loops.test_flexible_against_tree import SCENES, shackled_beam, slider_crank
+from tests.system.loops.test_flexible_constraints import ROWS, blade_model
 
-from .test_loop_assembly import AGREEMENT, TIME, interpreted, settled
+from .test_loop_assembly import AGREEMENT, TIME, interpreted_outputs, start_state
 
 
 def agree(model: mstmm.Model, rng: np.random.Generator) -> None:
     """The accelerations of a state and those of IR with plain floats."""
     q, u = model.initial_state()
     u = u + rng.normal(scale=0.3, size=model.nu)
-    found, wanted = interpreted(model, q, u), model.accelerations(q, u, TIME)
+    found, wanted = interpreted_outputs(model, q, u), model.accelerations(q, u, TIME)
     assert worst(np.array(found["udot"]), wanted) < 1e-11
 
 
@@ -33,17 +33,17 @@ def test_loops_of_hinges(name: str, rng: np.random.Generator) -> None:
 @pytest.mark.parametrize("name", ROWS)
 def test_constraints_and_couplings(name: str, rng: np.random.Generator) -> None:
     closing, ring, _ = ROWS[name]
-    agree(bladed(ring, **closing), rng)
+    agree(blade_model(ring, **closing), rng)
 
 
 @pytest.mark.parametrize("seed", [101, 118, 138])
 def test_random_chains(seed: int, rng: np.random.Generator) -> None:
     """Any frame, any end held, sections within."""
     tree = random_beams.random_system(seed, most=3, chain=True)
-    agree(looped_model(closed(tree, seed)[0]), rng)
+    agree(looped_model(closed_scene(tree, seed)[0]), rng)
 
 
-@pytest.fixture(scope="module", params=[slider_crank, shackled], ids=["crank", "shackle"])
+@pytest.fixture(scope="module", params=[slider_crank, shackled_beam], ids=["crank", "shackle"])
 def both(request: pytest.FixtureRequest) -> tuple[mstmm.Model, mstmm.Model]:
     """What closes by the looped engine and by code of its own."""
     scene = request.param()
@@ -58,9 +58,9 @@ def test_loops_are_closed_alike(
     looped, fused = both
     q, u = looped.initial_state()
     near = q + away * rng.normal(size=looped.nq), u + away * rng.normal(size=looped.nu)
-    wanted = settled(looped, *near)
+    wanted = start_state(looped, *near)
     assert np.abs(wanted - np.concatenate(near)).max() > 0.1 * away
-    assert np.abs(settled(fused, *near) - wanted).max() < 10 * AGREEMENT
+    assert np.abs(start_state(fused, *near) - wanted).max() < 10 * AGREEMENT
 
 
 def test_runs_and_batches(both: tuple[mstmm.Model, mstmm.Model]) -> None:

@@ -26,13 +26,13 @@ from .test_inverse_dynamics import beams
 KINDS = {"positions": "q", "poses": "q", "velocities": "qu", "jacobian": "q", "jacobian_rate": "qu"}
 
 
-def apart(found: Array, expected: Array) -> float:
-    """Code of a scene has zeros where the loops have rounding."""
+def relative_difference(found: Array, expected: Array) -> float:
+    """Largest difference over the largest entry, or over 1: code of a scene has exact zeros."""
     return float(np.abs(found - expected).max()) / max(1.0, float(np.abs(expected).max()))
 
 
-def replayed(model: mstmm.Model, of: str, q: Array, u: Array) -> dict[str, Array]:
-    """What the kernels give."""
+def replay_kernels(model: mstmm.Model, of: str, q: Array, u: Array) -> dict[str, Array]:
+    """Outputs of the kernels of an end, evaluated in floats."""
     assert isinstance(model.fusion, Fusion)
     structure, p = structure_of(model.packed_scene.system, model.known or {})
     body, axes, offset = model.packed_scene.end(of)
@@ -56,14 +56,14 @@ def test_trees(seed: int) -> None:
     q, u = random_state(scene, seed)
     for body in scene["body"]:
         of = body["name"]
-        found, pose = replayed(model, of, q, u), model.poses(q, of)
-        assert apart(found["place"], pose[:3, 3]) < 1e-12
-        assert apart(found["axes"].reshape(3, 3), pose[:3, :3]) < 1e-12
-        assert apart(found["velocity"], model.velocities(q, u, of)) < 1e-12
+        found, pose = replay_kernels(model, of, q, u), model.poses(q, of)
+        assert relative_difference(found["place"], pose[:3, 3]) < 1e-12
+        assert relative_difference(found["axes"].reshape(3, 3), pose[:3, :3]) < 1e-12
+        assert relative_difference(found["velocity"], model.velocities(q, u, of)) < 1e-12
         jacobian = model.jacobian(q, of)
-        assert apart(found["jacobian"].reshape(jacobian.shape), jacobian) < 1e-12
+        assert relative_difference(found["jacobian"].reshape(jacobian.shape), jacobian) < 1e-12
         rate = model.jacobian_rate(q, u, of)
-        assert apart(found["jacobian_rate"].reshape(rate.shape), rate) < 1e-11
+        assert relative_difference(found["jacobian_rate"].reshape(rate.shape), rate) < 1e-11
 
 
 @pytest.fixture
@@ -88,8 +88,8 @@ def machine() -> mstmm.Scene:
     )  # fmt: skip
 
 
-def made(model: mstmm.Model) -> set[str]:
-    """Parts of the scene's code that there are."""
+def compiled_parts(model: mstmm.Model) -> set[str]:
+    """Parts of the scene's code that are compiled."""
     assert isinstance(model.fusion, Fusion)
     return set(model.fusion.libraries)
 
@@ -101,9 +101,9 @@ def test_compiled_code_serves_single_calls(rng: Generator, at_once: None) -> Non
         for kind, given in KINDS.items():
             states = (q, u)[: len(given)]
             ours, theirs = (getattr(model, kind)(*states, of) for model in (fused, looped))
-            assert apart(ours, theirs) < 1e-12, kind
-    assert {"points 0", "points 1", "points 2"} <= made(fused)
-    assert not made(looped)
+            assert relative_difference(ours, theirs) < 1e-12, kind
+    assert {"points 0", "points 1", "points 2"} <= compiled_parts(fused)
+    assert not compiled_parts(looped)
 
 
 @pytest.mark.parametrize("name", ["four_bar", "bricard", "stewart_platform"])
@@ -117,8 +117,8 @@ def test_closed_loops_have_no_say(name: str, rng: Generator, at_once: None) -> N
     for kind, given in KINDS.items():
         states = (q, u)[: len(given)]
         ours, theirs = (getattr(model, kind)(*states, of) for model in (fused, looped))
-        assert apart(ours, theirs) < 1e-12, kind
-    assert any(part.startswith("points") for part in made(fused))
+        assert relative_difference(ours, theirs) < 1e-12, kind
+    assert any(part.startswith("points") for part in compiled_parts(fused))
 
 
 def test_numbers_of_a_variant_are_its_own(rng: Generator, at_once: None) -> None:
@@ -127,9 +127,9 @@ def test_numbers_of_a_variant_are_its_own(rng: Generator, at_once: None) -> None
     q = rng.normal(size=fused.nq)
     before, change = fused.jacobian(q, "c.tool"), {"a.ends.tip.position[0]": 1.7}
     fused, longer = fused.with_parameters(change), longer.with_parameters(change)
-    assert "points 2" in made(fused)
-    assert apart(fused.jacobian(q, "c.tool"), longer.jacobian(q, "c.tool")) < 1e-12
-    assert apart(fused.jacobian(q, "c.tool"), before) > 0.01
+    assert "points 2" in compiled_parts(fused)
+    assert relative_difference(fused.jacobian(q, "c.tool"), longer.jacobian(q, "c.tool")) < 1e-12
+    assert relative_difference(fused.jacobian(q, "c.tool"), before) > 0.01
 
 
 def test_code_that_pays_serves_all_that_is_asked_of_its_body(
@@ -141,22 +141,22 @@ def test_code_that_pays_serves_all_that_is_asked_of_its_body(
     before = model.jacobian_rate(q, u, "c")
     for _ in range(126):
         model.positions(q, "c")
-    assert "points 2" not in made(model)
+    assert "points 2" not in compiled_parts(model)
     model.positions(q, "c")
-    assert "points 2" in made(model)
+    assert "points 2" in compiled_parts(model)
     kinematics = model._kinematics
     assert not kinematics._request_counts and [kind for kind, _ in kinematics._calls] == ["places"]
-    assert apart(model.jacobian_rate(q, u, "c"), before) < 1e-12
+    assert relative_difference(model.jacobian_rate(q, u, "c"), before) < 1e-12
 
 
 def test_the_ground_and_what_bends_are_left_to_the_loops(rng: Generator, at_once: None) -> None:
     fused = mstmm.compile(machine(), engine="fused")
     q = rng.normal(size=fused.nq)
     assert not fused.jacobian(q, ["ground", "c"])[0].any()
-    assert not any(part.startswith("points") for part in made(fused))
+    assert not any(part.startswith("points") for part in compiled_parts(fused))
     bent = mstmm.compile(mstmm.Scene(**beams()), engine="fused")
     bent.velocities(np.zeros(bent.nq), np.zeros(bent.nu), "b.tip")
-    assert not any(part.startswith("points") for part in made(bent))
+    assert not any(part.startswith("points") for part in compiled_parts(bent))
 
 
 @pytest.mark.parametrize("of", ["nobody", ["a", "nobody"]])

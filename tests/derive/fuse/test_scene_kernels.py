@@ -29,20 +29,22 @@ def bound(model: mstmm.Model, q: Array) -> float:
     return float(AGREEMENT * max(1.0, condition / 1e3))
 
 
-def looped(scene: dict[str, Any], q: Array, u: Array, efforts: Array | None = None) -> Array:
+def looped_accelerations(
+    scene: dict[str, Any], q: Array, u: Array, efforts: Array | None = None
+) -> Array:
     model = mstmm.compile(mstmm.Scene(**scene), engine="looped")
     assert model.engine == "looped"
     return model.accelerations(q, u, TIME, efforts)
 
 
-def fused(scene: dict[str, Any], **options: Any) -> mstmm.Model:
+def fused_model(scene: dict[str, Any], **options: Any) -> mstmm.Model:
     model = mstmm.compile(mstmm.Scene(**scene), engine="fused", **options)
     assert model.engine == "fused"
     return model
 
 
-def interpreted(model: mstmm.Model, q: Array, u: Array) -> dict[str, Any]:
-    """The fused IR with plain floats."""
+def interpreted_outputs(model: mstmm.Model, q: Array, u: Array) -> dict[str, Any]:
+    """Outputs of the fused IR for a state, evaluated in floats."""
     structure, p = structure_of(model.packed_scene.system, model.known or {})
     found = model.fusion.structure_ir(structure).kernels
     kernel = found.get("accelerations_power", found["accelerations"])
@@ -57,7 +59,7 @@ def interpreted(model: mstmm.Model, q: Array, u: Array) -> dict[str, Any]:
 def test_interpreted_equals_looped(draw: int, rng: Generator) -> None:
     scene, q, u = fresh(rng)
     model = mstmm.compile(mstmm.Scene(**scene), engine="looped")
-    found, expected = interpreted(model, q, u)["udot"], model.accelerations(q, u, TIME)
+    found, expected = interpreted_outputs(model, q, u)["udot"], model.accelerations(q, u, TIME)
     assert worst(found, expected) < bound(model, q)
 
 
@@ -68,7 +70,7 @@ def test_compiled_equals_looped(kind: str, rng: Generator) -> None:
         options = {"types": (kind,), "chain": True, "most": 3}
     scene, q, u = fresh(rng, **options)
     efforts = rng.normal(size=u.shape)
-    model, expected = fused(scene), looped(scene, q, u, efforts)
+    model, expected = fused_model(scene), looped_accelerations(scene, q, u, efforts)
     allowed = bound(model, q)
     assert worst(model.accelerations(q, u, TIME, efforts), expected) < allowed
     states = 11
@@ -80,9 +82,11 @@ def test_compiled_equals_looped(kind: str, rng: Generator) -> None:
 
 def test_baked_equals_looped(rng: Generator) -> None:
     scene, q, u = fresh(rng, most=3)
-    model = fused(scene, bake=True)
+    model = fused_model(scene, bake=True)
     assert not len(model.fusion.numbers)
-    assert worst(model.accelerations(q, u, TIME), looped(scene, q, u)) < bound(model, q)
+    assert worst(model.accelerations(q, u, TIME), looped_accelerations(scene, q, u)) < bound(
+        model, q
+    )
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -292,7 +292,7 @@ def test_what_cannot_be_lowered_says_why() -> None:
             plain(*definitions, outputs=outputs)
 
 
-def sized(*statements: object, outputs: tuple[Port, ...] = (Port("y", ("n",)),)) -> KernelIR:
+def sized_kernel(*statements: object, outputs: tuple[Port, ...] = (Port("y", ("n",)),)) -> KernelIR:
     inputs = (Port("A", ("n", "n")), Port("x", ("n",)))
     return KernelIR("wrong", inputs, outputs, statements, size_symbol="n")  # type: ignore[arg-type]
 
@@ -301,26 +301,28 @@ def test_the_ir_refuses_loops_that_no_backend_has() -> None:
     a_kl, x_k = Element("A", ("k", "l")), Element("x", ("k",))
     inner = Sum(0, (), a_kl, "k")
     with pytest.raises(ValueError, match="a sum over 'k' inside loops over"):
-        sized(Store("y", ("k",), Element("x", ("k",)), (inner,)))
+        sized_kernel(Store("y", ("k",), Element("x", ("k",)), (inner,)))
     with pytest.raises(ValueError, match="a sum over 'j'"):
-        sized(Sum(0, (), x_k, "j"))
+        sized_kernel(Sum(0, (), x_k, "j"))
     with pytest.raises(ValueError, match="outside a loop"):
-        sized(Store("y", ("k",), a_kl))
+        sized_kernel(Store("y", ("k",), a_kl))
     square = (Port("Y", ("n", "n")),)
     with pytest.raises(ValueError, match="stores only a diagonal"):
-        sized(Store("Y", ("k", "k"), x_k), outputs=square)
+        sized_kernel(Store("Y", ("k", "k"), x_k), outputs=square)
     with pytest.raises(ValueError, match="no port named 'y'"):
-        sized(Sum(0, (), Element("y", ("k",))), Store("y", ("k",), x_k))
+        sized_kernel(Sum(0, (), Element("y", ("k",))), Store("y", ("k",), x_k))
     with pytest.raises(ValueError, match="stored again"):
-        sized(Store("y", ("k",), x_k), Store("y", ("k",), x_k))
+        sized_kernel(Store("y", ("k",), x_k), Store("y", ("k",), x_k))
     growing = (Port("y", ("n",), accumulate=True),)
     with pytest.raises(ValueError, match="no port named 'y'"):
-        sized(Store("y", ("k",), x_k), Sum(0, (), Element("y", ("k",))), outputs=growing)
+        sized_kernel(Store("y", ("k",), x_k), Sum(0, (), Element("y", ("k",))), outputs=growing)
     two = (Port("Y", (2, "n")), Port("z"))
     half = Store("Y", (0, "k"), x_k)
     with pytest.raises(ValueError, match="no port named 'Y'"):
-        sized(half, Sum(0, (), Element("Y", (0, "k"))), outputs=two)
-    whole = sized(half, Store("Y", (1, "k"), x_k), Sum(0, (), Element("Y", (0, "k"))), outputs=two)
+        sized_kernel(half, Sum(0, (), Element("Y", (0, "k"))), outputs=two)
+    whole = sized_kernel(
+        half, Store("Y", (1, "k"), x_k), Sum(0, (), Element("Y", (0, "k"))), outputs=two
+    )
     assert from_json(to_json(whole)) == whole
 
 

@@ -38,7 +38,7 @@ def without(scene: Scene, *keys: str) -> Scene:
     return found
 
 
-def compiled(scene: Scene) -> tuple[mstmm.Model, TangentMatrix]:
+def model_and_tangent(scene: Scene) -> tuple[mstmm.Model, TangentMatrix]:
     model = mstmm.compile(mstmm.Scene(**scene), engine="looped")
     return model, TangentMatrix(model.looped)
 
@@ -47,7 +47,7 @@ def changes(
     scene: Scene, q: Array, u: Array, a: Array, steps: Sequence[tuple[Array, ...]]
 ) -> Array:
     """Columns: change of the residual along each (d_q, d_u, d_a)."""
-    _, tangent = compiled(scene)
+    _, tangent = model_and_tangent(scene)
     tangent.residual(TIME, q, u, a)
     columns = [tangent.slope(0.0, *step) for step in steps]
     return np.asarray(np.array(columns).reshape(len(steps), tangent.nu).T)
@@ -59,7 +59,7 @@ def symmetric(matrix: Array) -> Array:
 
 def stands_for(scene: Scene, q: Array, u: Array, a: Array) -> Array:
     """S M plus the symmetric part of what laws and modes add."""
-    model, tangent = compiled(scene)
+    model, tangent = model_and_tangent(scene)
     units, still_q, still = np.eye(model.nu), np.zeros(model.nq), np.zeros(model.nu)
     mass = changes(scene, q, u, a, [(still_q, still, unit) for unit in units])
     along = [(tangent.rates(q, unit) / SQ, unit, still) for unit in units]
@@ -75,7 +75,7 @@ def stands_for(scene: Scene, q: Array, u: Array, a: Array) -> Array:
 
 def check(scene: Scene, q: Array, u: Array, rng: Generator) -> None:
     scene = without(scene, "effort")  # an expression of the state is no slope of a law
-    model, tangent = compiled(scene)
+    model, tangent = model_and_tangent(scene)
     a, right = rng.normal(size=model.nu), rng.normal(size=model.nu)
     matrix = stands_for(scene, q, u, a)
     rows = np.flatnonzero(np.abs(matrix).max(axis=1, initial=0.0) > 0)

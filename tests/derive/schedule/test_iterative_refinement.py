@@ -18,7 +18,7 @@ from tests.runtime.packing.test_qr_sweep import HEAVY, TIME, with_tip
 from tests.support.scenes.rods import chain, drawn_state
 
 
-def compiled(scene: dict[str, Any], engine: str = "looped", **options: Any) -> mstmm.Model:
+def model_with_sweep(scene: dict[str, Any], engine: str = "looped", **options: Any) -> mstmm.Model:
     return mstmm.compile(mstmm.Scene(**scene), engine, **{"sweep": "refined"} | options)
 
 
@@ -34,20 +34,20 @@ def errors(models: list[mstmm.Model], states: list[tuple[Array, Array]]) -> list
 def test_a_heavy_tip(name: str, power: int, accuracy: float, rng: np.random.Generator) -> None:
     """The square of what one sweep loses is left, the cube where the start asks for two."""
     scene = with_tip(HEAVY[name], 10.0**power)
-    models = [compiled(scene, sweep="riccati"), compiled(scene)]
+    models = [model_with_sweep(scene, sweep="riccati"), model_with_sweep(scene)]
     plain, refined = errors(models, [drawn_state(scene, rng) for _ in range(3)])
     assert refined < accuracy < 1e-3 * plain
 
 
 def test_code_of_its_own(rng: np.random.Generator) -> None:
     scene = with_tip(chain(["pin"] * 4), 1e8)
-    models = [compiled(scene, "fused", sweep="riccati"), compiled(scene, "fused")]
+    models = [model_with_sweep(scene, "fused", sweep="riccati"), model_with_sweep(scene, "fused")]
     assert models[1].engine == "fused"
     states = [drawn_state(scene, rng) for _ in range(3)]
     plain, refined = errors(models, states)
     assert refined < 1e-14 < 1e-3 * plain
     q, u = (np.array(part) for part in zip(*states, strict=True))
-    assert worst(models[1].accelerations(q, u), compiled(scene).accelerations(q, u)) < 1e-14
+    assert worst(models[1].accelerations(q, u), model_with_sweep(scene).accelerations(q, u)) < 1e-14
 
 
 @pytest.mark.parametrize("engine", ["looped", "fused"])
@@ -58,7 +58,7 @@ def test_rotors_laws_loads_and_drives(engine: str, rng: np.random.Generator) -> 
     scene["hinge"] = [hinge | {"law": law} for hinge in scene["hinge"]]
     scene["hinge"][1] |= {"drive": "0.3*sin(2*t)", "law": {"inertia": [0.2]}}
     scene["hinge"][3] |= {"law": {"stiffness": [1e9], "inertia": [1e7]}}
-    models = [compiled(scene, sweep="riccati"), compiled(scene, engine)]
+    models = [model_with_sweep(scene, sweep="riccati"), model_with_sweep(scene, engine)]
     states = [tuple(rng.uniform(-1, 1, (2, 4))) for _ in range(3)]
     for q, u in states:
         q[1], u[1] = 0.0, 0.6
@@ -75,7 +75,11 @@ def test_a_flexible_body_before_the_heavy_one(rng: np.random.Generator) -> None:
         "hinge": [{"name": f"pin{k}", "type": "pin", "inboard": a, "outboard": b}
                   for k, (a, b) in enumerate(sides)],
     }  # fmt: skip
-    models = [compiled(scene, sweep="riccati"), compiled(scene), compiled(scene, "fused")]
+    models = [
+        model_with_sweep(scene, sweep="riccati"),
+        model_with_sweep(scene),
+        model_with_sweep(scene, "fused"),
+    ]
     states = [tuple(rng.uniform(-0.1, 0.1, (2, models[0].nu))) for _ in range(3)]
     plain, looped, fused = errors(models, states)
     assert max(looped, fused) < 1e-12 < 1e-2 * plain
@@ -85,7 +89,7 @@ def test_a_flexible_body_before_the_heavy_one(rng: np.random.Generator) -> None:
 def test_random_trees_keep_loads_and_energy(seed: int) -> None:
     """What a refined evaluation leaves behind is read by forces, efforts and power."""
     scene, q, u = drawn(seed)
-    model, other = compiled(scene), compiled(scene, sweep="riccati")
+    model, other = model_with_sweep(scene), model_with_sweep(scene, sweep="riccati")
     assert worst(model.accelerations(q, u, t=TIME), dense.solve(scene, q, u, TIME).udot) < 1e-12
     here: dict[str, Any] = {"t_start": TIME, "t_end": TIME, "initial": (q, u)}
     found, expected = model.simulate(**here), other.simulate(**here)
@@ -105,14 +109,14 @@ def test_a_rotor_that_is_let_go() -> None:
     held = scene | {"hinge": [dict(hinge) for hinge in scene["hinge"]]}
     held["hinge"][1] |= rotor | {"drive": "0", "release": "t >= 0"}
     scene["hinge"][1] |= rotor
-    runs = [compiled(one).simulate(1e-3, rtol=1e-11, atol=1e-14) for one in (held, scene)]
+    runs = [model_with_sweep(one).simulate(1e-3, rtol=1e-11, atol=1e-14) for one in (held, scene)]
     assert worst(runs[0].q[-1], runs[1].q[-1]) < 1e-11
 
 
 def test_solutions_of_the_mass_matrix(rng: np.random.Generator) -> None:
     scene = with_tip(HEAVY["skew pins"], 1e10)
     q, columns = rng.uniform(-1, 1, 8), rng.uniform(-1, 1, (8, 3))
-    refined, plain, rows = (compiled(scene, sweep=s) for s in ("refined", "riccati", "qr"))
+    refined, plain, rows = (model_with_sweep(scene, sweep=s) for s in ("refined", "riccati", "qr"))
     exact = rows.solve(q, columns).T
     kept, lost = (max(map(relative_error, m.solve(q, columns).T, exact)) for m in (refined, plain))
     assert kept < 1e-2 * lost
@@ -121,7 +125,7 @@ def test_solutions_of_the_mass_matrix(rng: np.random.Generator) -> None:
 def test_the_risk_of_lost_digits_is_none_there(tmp_path: Path) -> None:
     """Until the sweep has no digits to refine with; a result keeps what it was made by."""
     scene = with_tip(chain(["pin"] * 4, gravity=(0, 0, 0)), 1e11)
-    run = compiled(scene).simulate(1e-3, rtol=1e-6)
+    run = model_with_sweep(scene).simulate(1e-3, rtol=1e-6)
     assert "pivot-loss" not in [risk.name for risk in run.risks]
     again = mstmm.load_result(run.save(tmp_path / "run.nc"))
     assert again.model.sweep == "refined"
@@ -132,12 +136,14 @@ def test_masses_that_leave_no_digits() -> None:
     with pytest.raises(
         SceneError, match=r'does not reduce: heavy body "rod7" .* or use sweep = "qr"'
     ):
-        compiled(with_tip(HEAVY["planar pins"], 1e18))
+        model_with_sweep(with_tip(HEAVY["planar pins"], 1e18))
 
 
 def test_an_implicit_run_goes_on_as_it_did() -> None:
     scene = with_tip(chain(["pin"] * 3), 1e6)
-    runs = [compiled(scene, sweep=s).simulate(0.01, "rodas5p") for s in ("refined", "riccati")]
+    runs = [
+        model_with_sweep(scene, sweep=s).simulate(0.01, "rodas5p") for s in ("refined", "riccati")
+    ]
     assert worst(runs[0].q[-1], runs[1].q[-1]) < 1e-9
 
 
@@ -145,6 +151,6 @@ def test_closed_loops_do_so_by_themselves() -> None:
     from tests.runtime.engine.loops.test_acceleration_refinement import chain as ring
 
     scene = ring([1.0, 1.0, 1.0, 1e6, 1.0, 1.0])
-    models = [compiled(scene), compiled(scene, sweep="riccati")]
+    models = [model_with_sweep(scene), model_with_sweep(scene, sweep="riccati")]
     q, u = models[0].initial_state()
     assert np.array_equal(models[0].accelerations(q, u), models[1].accelerations(q, u))

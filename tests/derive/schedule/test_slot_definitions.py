@@ -120,23 +120,23 @@ def test_reasons_of_failure_are_those_of_the_engine() -> None:
 # --- the printed C ----------------------------------------------------------------------------
 
 
-def swapped(kernel: KernelIR) -> KernelIR:
+def reverse_inputs(kernel: KernelIR) -> KernelIR:
     return replace(kernel, inputs=tuple(reversed(kernel.inputs)))
 
 
 def test_the_order_of_ports_may_change() -> None:
     """A kernel with other places for its arrays is called by the same words, and rightly."""
     frames = SPECS["sweep", "frames"]
-    kernels = tuple(swapped(k) if k.name == "pose" else k for k in frames.kernels)
+    kernels = tuple(reverse_inputs(k) if k.name == "pose" else k for k in frames.kernels)
     other = SPECS | {("sweep", "frames"): replace(frames, kernels=kernels)}
 
-    def handed(text: str) -> str:
+    def pose_arguments(text: str) -> str:
         found = re.search(r"return mstmm_sweep_frames_pose\(\s*([^)]*)\)", text)
         assert found
         return " ".join(found[1].split())
 
-    assert handed(kernel_calls_header(SPECS)) == "to.A_I, to.x_I, to.Rc, to.r, to.A, to.x"
-    assert handed(kernel_calls_header(other)) == "to.r, to.Rc, to.x_I, to.A_I, to.A, to.x"
+    assert pose_arguments(kernel_calls_header(SPECS)) == "to.A_I, to.x_I, to.Rc, to.r, to.A, to.x"
+    assert pose_arguments(kernel_calls_header(other)) == "to.r, to.Rc, to.x_I, to.A_I, to.A, to.x"
     assert re.findall(r"\.A_I = [^,]*", sweep_files(other)["sweep_steps.c"]) == re.findall(
         r"\.A_I = [^,]*", sweep_files(SPECS)["sweep_steps.c"]
     )
@@ -144,7 +144,7 @@ def test_the_order_of_ports_may_change() -> None:
 
 def test_hinges_of_one_room_have_the_same_ports() -> None:
     pin = SPECS["hinge", "pin"]
-    kernels = tuple(swapped(k) if k.name == "condense" else k for k in pin.kernels)
+    kernels = tuple(reverse_inputs(k) if k.name == "condense" else k for k in pin.kernels)
     with pytest.raises(ValueError, match="condense: not every element has the same ports"):
         collect_callees(SPECS | {("hinge", "pin"): replace(pin, kernels=kernels)})
 

@@ -67,7 +67,7 @@ def force(wrench: str = "(-p.k * x, sp.zeros(3, 1))", potential: str = "p.k * x.
     return HEAD + FORCE.replace("WRENCH", wrench).replace("POTENTIAL", potential)
 
 
-def declared(what: str, text: str) -> str:
+def hinge_source(what: str, text: str) -> str:
     """A hinge with one class attribute of its own."""
     lines = f"class Mine(Hinge):\n    name = 'mine'\n    {what} = {text}\n"
     return HEAD + lines + "    def rotation(self, q, p): return rotation_about(2, q[0])\n"
@@ -156,10 +156,10 @@ WRONG: dict[str, tuple[str, str]] = {
     "sum": (along("p.r + p.r**2"), "adds m and m|adds m.2 and m"),
     "sine of a length": (along("p.r * sp.sin(p.r)"), "sin.* expects a pure number, found m"),
     "unit": (
-        declared("parameters", "(Param('r', 'furlong'),)"),
+        hinge_source("parameters", "(Param('r', 'furlong'),)"),
         "unknown unit 'furlong'; use m, kg",
     ),
-    "no unit": (declared("parameters", "(Param('r', 3),)"), "unit of r: expected text such as"),
+    "no unit": (hinge_source("parameters", "(Param('r', 3),)"), "unit of r: expected text such as"),
     # speeds
     "speeds": (
         own("speeds = (Param('w', 'rad/s'), Param('z', 'rad/s'))"),
@@ -200,25 +200,28 @@ WRONG: dict[str, tuple[str, str]] = {
     "path": (hinge().replace('"mine"', '"../mine"'), "is not a name"),
     "long name": (hinge().replace('"mine"', '"k" * 300'), "is not a name: at most 60"),
     "twice": (
-        declared("coordinates", "(Param('a', 'rad'), Param('a', 'rad'))"),
+        hinge_source("coordinates", "(Param('a', 'rad'), Param('a', 'rad'))"),
         "'a' is declared twice",
     ),
-    "plain text": (declared("coordinates", "('a',)"), "coordinates: expected a tuple such as"),
-    "one": (declared("coordinates", "Param('a', 'rad')"), "coordinates: expected a tuple such as"),
+    "plain text": (hinge_source("coordinates", "('a',)"), "coordinates: expected a tuple such as"),
+    "one": (
+        hinge_source("coordinates", "Param('a', 'rad')"),
+        "coordinates: expected a tuple such as",
+    ),
     "name of a coordinate": (
-        declared("coordinates", "(Param('a b', 'rad'),)"),
+        hinge_source("coordinates", "(Param('a b', 'rad'),)"),
         "'a b' is not a name",
     ),
     "bound": (
-        declared("parameters", "(Param('r', 'm', minimum=math.nan),)"),
+        hinge_source("parameters", "(Param('r', 'm', minimum=math.nan),)"),
         "minimum: expected a number",
     ),
     "bounds": (
-        declared("parameters", "(Param('r', 'm', minimum=3, maximum=1),)"),
+        hinge_source("parameters", "(Param('r', 'm', minimum=3, maximum=1),)"),
         "minimum <= default",
     ),
     "default": (
-        declared("parameters", "(Param('r', 'm', default=1, minimum=2),)"),
+        hinge_source("parameters", "(Param('r', 'm', default=1, minimum=2),)"),
         "minimum <= default",
     ),
     # bodies
@@ -297,7 +300,7 @@ ACCEPTED = {
     ),
     "arrays": hinge("numpy.eye(3)", "numpy.array([p.r * q.a, 0, 0])"),
     "piecewise": along("sp.Piecewise((p.r * q.a**2, q.a > 0), (0, True))"),
-    "list of parameters": declared("coordinates", "[Param('a', 'rad')]"),
+    "list of parameters": hinge_source("coordinates", "[Param('a', 'rad')]"),
     "body": body(),
     "force": force("([-p.k * x[0], 0, 0], [0, 0, 0])"),
 }
@@ -364,7 +367,7 @@ def crank(parameters: dict[str, Any]) -> dict[str, Any]:
     return {"gravity": [0, -9.81, 0], "body": [rod], "hinge": [joint | {"parameters": parameters}]}
 
 
-CRANK = declared(
+CRANK = hinge_source(
     "parameters",
     "(Param('r', 'm', 'throw', minimum=0.1, maximum=2), Param('s', 'm', default=0.5, minimum=0))"
     "\n    coordinates = (Param('a', 'rad'),)"

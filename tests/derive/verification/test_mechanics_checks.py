@@ -71,11 +71,11 @@ def test_a_turned_sign_is_noticed(
         altered = [mutant if k.name == kernel else k for k in good.values()]
         if name == "laws":
             altered = [mutant]
-        assert noticed(kind, name, altered), mutant.derivation.definition(quantity)
+        assert is_detected(kind, name, altered), mutant.derivation.definition(quantity)
 
 
-def noticed(kind: str, name: str, altered: list[Kernel]) -> bool:
-    """By mechanics, or, below the diagonal of a symmetric quantity, by comparing the kernels."""
+def is_detected(kind: str, name: str, altered: list[Kernel]) -> bool:
+    """Whether mechanics, or for a symmetric quantity the comparison of kernels, finds it."""
     if not all(s.passed for s in mechanics_statements(kind, name, altered, definition(kind, name))):
         return True
     return any(

@@ -52,12 +52,12 @@ def test_a_bracket_ends_where_no_number_lies_between(scale: Scale) -> None:
 
 
 def test_no_answer_and_no_number_are_failures() -> None:
-    def measured(x: float) -> float:
+    def failing_measure(x: float) -> float:
         if x > 5:
             raise NumericalFailure("none")
         return math.nan if x > 3 else 0.0
 
-    tried = MeasuredMethod(measured, 1.0)
+    tried = MeasuredMethod(failing_measure, 1.0)
     found = find_frontier(tried, (0.0, 4.0, 6.0), LINEAR_SCALE, 1e-6)
     assert found.fails_at == pytest.approx(3.0, rel=1e-5)
     assert found.points[-1] == (6.0, math.inf)

@@ -18,23 +18,23 @@ AGAIN = "mstmm stability --out docs/explanation/failures writes it anew"
 
 
 @pytest.fixture(scope="module")
-def kept() -> list[dict[str, Any]]:
+def stored_cases() -> list[dict[str, Any]]:
     found: list[dict[str, Any]] = json.loads((FOLDER / "atlas.json").read_text())["cases"]
     return found
 
 
-def test_every_case_is_on_the_page(kept: list[dict[str, Any]]) -> None:
-    assert sorted(case["name"] for case in kept) == sorted(EXPECTED), AGAIN
+def test_every_case_is_on_the_page(stored_cases: list[dict[str, Any]]) -> None:
+    assert sorted(case["name"] for case in stored_cases) == sorted(EXPECTED), AGAIN
     assert {path.stem for path in FOLDER.glob("*.png")} == set(EXPECTED), AGAIN
 
 
-def test_the_page_says_what_the_data_do(kept: list[dict[str, Any]]) -> None:
-    text = markdown_page([from_plain(CaseResult, case) for case in kept], pictures=True)
+def test_the_page_says_what_the_data_do(stored_cases: list[dict[str, Any]]) -> None:
+    text = markdown_page([from_plain(CaseResult, case) for case in stored_cases], pictures=True)
     assert (FOLDER / "atlas.md").read_text() == text, AGAIN
 
 
-def test_its_frontiers_lie_where_they_are_expected(kept: list[dict[str, Any]]) -> None:
-    for case in kept:
+def test_its_frontiers_lie_where_they_are_expected(stored_cases: list[dict[str, Any]]) -> None:
+    for case in stored_cases:
         (low, high), reach = EXPECTED[case["name"]]
         assert low <= case["fails_at"] <= high, AGAIN
         beyond = case["remedy_holds_to"] >= reach

@@ -21,7 +21,7 @@ def place(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder / "cache"
 
 
-def filled(count: int) -> list[libraries.BuiltLibrary]:
+def build_libraries(count: int) -> list[libraries.BuiltLibrary]:
     def recipe(i: int) -> libraries.Recipe:
         text = f"const int number = {i};\n"
         return libraries.Recipe("part", {"i": str(i)}, lambda key: {"p.c": text}, (), ("number",))
@@ -38,7 +38,7 @@ def test_empty_cache(mstmm: Command, place: Path) -> None:
 
 
 def test_list_verify_clean(mstmm: Command, place: Path) -> None:
-    first, second = filled(2)
+    first, second = build_libraries(2)
     listed = mstmm("cache")
     assert listed.code == 0 and "2 libraries, 2 intact" in listed.out
     assert listed.out.count("part-") >= 2
@@ -123,8 +123,8 @@ def _wrong_size(place: Path, patch: pytest.MonkeyPatch) -> None:
     patch.setenv("MSTMM_CACHE_SIZE", "plenty")
 
 
-def _damaged(place: Path, patch: pytest.MonkeyPatch) -> None:
-    (built,) = filled(1)
+def _empty_library(place: Path, patch: pytest.MonkeyPatch) -> None:
+    (built,) = build_libraries(1)
     built.path.write_bytes(b"")
 
 
@@ -136,7 +136,9 @@ def _damaged(place: Path, patch: pytest.MonkeyPatch) -> None:
         (_wrong, "compiling", "wrong numbers"),
         (_foreign, "cache", "MSTMM_CACHE"),
         (_wrong_size, "cache", "MSTMM_CACHE_SIZE"),
-        (_damaged, "cache", "mstmm cache clean"),
+        pytest.param(
+            _empty_library, "cache", "mstmm cache clean", id="_damaged-cache-mstmm cache clean"
+        ),
     ],
 )
 def test_doctor_finds_what_is_wrong(

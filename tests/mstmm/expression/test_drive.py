@@ -28,7 +28,7 @@ def in_high_precision(text: str, t: mp.mpf) -> mp.mpf:
     expression = parse(text)
     known: list[mp.mpf] = []
 
-    def one(term: Term) -> mp.mpf:
+    def term_value(term: Term) -> mp.mpf:
         if term.op == "number":
             assert term.exact is not None
             return mp.mpf(term.exact.numerator) / term.exact.denominator
@@ -37,7 +37,7 @@ def in_high_precision(text: str, t: mp.mpf) -> mp.mpf:
         return MP[term.op](*(known[i] for i in term.args))
 
     for term in expression.terms:
-        known.append(one(term))
+        known.append(term_value(term))
     return known[expression.root]
 
 

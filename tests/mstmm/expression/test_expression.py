@@ -336,11 +336,11 @@ def test_numbers_come_back_exactly(x: float) -> None:
 
 
 def test_values_outside_the_domain_are_nan_or_infinite() -> None:
-    def at(text: str, t: float) -> float:
+    def value_at(text: str, t: float) -> float:
         return parse(text).evaluate(lambda _: t)
 
-    assert math.isnan(at("sqrt(t)", -1.0))
-    assert math.isnan(at("t/t", 0.0))
-    assert at("1/t", 0.0) == math.inf
-    assert at("exp(t)", 1e4) == math.inf
-    assert at("where(t > 0, 1/t, 5)", 0.0) == 5.0
+    assert math.isnan(value_at("sqrt(t)", -1.0))
+    assert math.isnan(value_at("t/t", 0.0))
+    assert value_at("1/t", 0.0) == math.inf
+    assert value_at("exp(t)", 1e4) == math.inf
+    assert value_at("where(t > 0, 1/t, 5)", 0.0) == 5.0

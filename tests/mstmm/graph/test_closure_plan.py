@@ -46,7 +46,7 @@ def test_closings_come_before_what_they_need_is_gone(seed: int) -> None:
         done.append(closing.body)
 
 
-def _stacked(plan: ClosurePlan, draw: random.Random) -> list[list[Fraction]]:
+def _coupling_matrix(plan: ClosurePlan, draw: random.Random) -> list[list[Fraction]]:
     """L of all groups as if each had one row: a sum of squares over the hinges they pass."""
     size = len(plan.groups)
     total = [[Fraction(0)] * size for _ in range(size)]
@@ -63,7 +63,7 @@ def _stacked(plan: ClosurePlan, draw: random.Random) -> list[list[Fraction]]:
 def test_blocks_that_are_left_out_are_zero(seed: int) -> None:
     """Gauss' elimination in exact numbers, group by group in the order of the closings."""
     plan = closure_plan(drawn(seed))
-    matrix = _stacked(plan, random.Random(seed))
+    matrix = _coupling_matrix(plan, random.Random(seed))
     left = set(range(len(plan.groups)))
     for closing in plan.closings:
         left.discard(closing.group)

@@ -90,7 +90,7 @@ def close(got: Sequence[float], wanted: Sequence[mpmath.mpf], tolerance: float) 
     return all(abs(a - b) <= tolerance * max(1.0, abs(a)) for a, b in pairs)
 
 
-def flipped(kernel: KernelIR) -> list[KernelIR]:
+def sign_mutants(kernel: KernelIR) -> list[KernelIR]:
     """The kernel with one sign changed, in every possible way."""
     swap = {"add": "sub", "sub": "add"}
     found = []
@@ -107,7 +107,7 @@ def test_one_flipped_sign_is_noticed(tmp_path: Path) -> None:
     kernel, inputs = random_kernel("smooth", 1, 40, SMOOTH), random_inputs(1)
     compiled = build(tmp_path, element("smooth", kernel)).call("smooth", "smooth", inputs)
     assert close(compiled.outputs["y"], evaluate(kernel, inputs)["y"], 1e-12)
-    mutants = flipped(kernel)
+    mutants = sign_mutants(kernel)
     assert len(mutants) >= 10
     for mutant in mutants:
         assert mutant.hash() != kernel.hash()

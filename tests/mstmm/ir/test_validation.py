@@ -29,7 +29,7 @@ def kernel(*statements: Statement, size: str | None = "n") -> KernelIR:
     return KernelIR("made", INPUTS, OUTPUTS, statements, size)
 
 
-def one(operand: object) -> Assign:
+def negation(operand: object) -> Assign:
     return Assign(0, "neg", (operand,))  # type: ignore[arg-type]
 
 
@@ -47,34 +47,34 @@ def test_a_sound_kernel_is_accepted() -> None:
 REFUSED: dict[str, tuple[Callable[[], KernelIR], str]] = {
     "unknown operation": (lambda: kernel(Assign(0, "cbrt", (X,))), "cbrt with 1 operands"),
     "operands": (lambda: kernel(Assign(0, "add", (X,))), "add with 1 operands"),
-    "undefined": (lambda: kernel(one(Temporary(3))), "t3 is used before it is defined"),
-    "itself": (lambda: kernel(one(Temporary(0))), "t0 is used before it is defined"),
-    "twice": (lambda: kernel(one(X), one(X)), "t0 is defined twice"),
-    "unknown port": (lambda: kernel(one(Element("q", (0,)))), "no port named 'q'"),
-    "output read": (lambda: kernel(one(Element("y"))), "no port named 'y'"),
+    "undefined": (lambda: kernel(negation(Temporary(3))), "t3 is used before it is defined"),
+    "itself": (lambda: kernel(negation(Temporary(0))), "t0 is used before it is defined"),
+    "twice": (lambda: kernel(negation(X), negation(X)), "t0 is defined twice"),
+    "unknown port": (lambda: kernel(negation(Element("q", (0,)))), "no port named 'q'"),
+    "output read": (lambda: kernel(negation(Element("y"))), "no port named 'y'"),
     "input written": (lambda: kernel(Store("x", (0,), X)), "no port named 'x'"),
-    "rank": (lambda: kernel(one(Element("x", (0, 0)))), r"x\[0, 0\] does not fit \(2,\)"),
-    "range": (lambda: kernel(one(Element("x", (2,)))), r"x\[2\] is out of range"),
-    "below": (lambda: kernel(one(Element("x", (-1,)))), r"x\[-1\] is out of range"),
-    "loop index": (lambda: kernel(one(Element("m", ("k",)))), r"m\['k'\] outside a loop"),
+    "rank": (lambda: kernel(negation(Element("x", (0, 0)))), r"x\[0, 0\] does not fit \(2,\)"),
+    "range": (lambda: kernel(negation(Element("x", (2,)))), r"x\[2\] is out of range"),
+    "below": (lambda: kernel(negation(Element("x", (-1,)))), r"x\[-1\] is out of range"),
+    "loop index": (lambda: kernel(negation(Element("m", ("k",)))), r"m\['k'\] outside a loop"),
     "other index": (
-        lambda: kernel(Sum(1, (one(Element("m", ("j",))),), Temporary(0))),
+        lambda: kernel(Sum(1, (negation(Element("m", ("j",))),), Temporary(0))),
         r"m\['j'\] outside a loop",
     ),
     "loop on a fixed axis": (
-        lambda: kernel(Sum(1, (one(Element("x", ("k",))),), Temporary(0))),
+        lambda: kernel(Sum(1, (negation(Element("x", ("k",))),), Temporary(0))),
         r"x\['k'\] does not fit \(2,\)",
     ),
     "fixed entry of a sized axis": (
-        lambda: kernel(one(Element("m", (0,)))),
+        lambda: kernel(negation(Element("m", (0,)))),
         r"m\[0\] does not fit \('n',\)",
     ),
     "local of a loop": (
-        lambda: kernel(Sum(1, (one(X),), Temporary(0)), Store("y", (), Temporary(0))),
+        lambda: kernel(Sum(1, (negation(X),), Temporary(0)), Store("y", (), Temporary(0))),
         "t0 is used before it is defined",
     ),
     "loop without size": (
-        lambda: KernelIR("made", INPUTS[:1], OUTPUTS[:1], (Sum(1, (one(X),), Temporary(0)),)),
+        lambda: KernelIR("made", INPUTS[:1], OUTPUTS[:1], (Sum(1, (negation(X),), Temporary(0)),)),
         "a loop without a size symbol",
     ),
     "other size": (lambda: kernel(size="m"), r"m has the shape \('n',\)"),
@@ -83,10 +83,10 @@ REFUSED: dict[str, tuple[Callable[[], KernelIR], str]] = {
         "two ports have the same name",
     ),
     "code": (lambda: kernel(Guard(X, 0, "never")), "code 0 means success, not 'never'"),
-    "constant": (lambda: kernel(one(Constant("e"))), "'e' is no number"),
-    "division": (lambda: kernel(one(Constant("1/0"))), "'1/0' is no number"),
+    "constant": (lambda: kernel(negation(Constant("e"))), "'e' is no number"),
+    "division": (lambda: kernel(negation(Constant("1/0"))), "'1/0' is no number"),
     "overflow": (
-        lambda: kernel(one(Constant("1" + "0" * 400))),
+        lambda: kernel(negation(Constant("1" + "0" * 400))),
         "is no number within the range of a double",
     ),
     "solve code": (lambda: kernel(Solve("z", "A", "m", 0, "no")), "code 0 means success"),

@@ -41,7 +41,7 @@ def symbols(most: int = 100_000) -> list[Formula]:
     return [book.symbol(name, value) for name, value in zip("xyz", AT, strict=True)]
 
 
-def at(found: Formula, given: list[Formula], values: tuple[float, ...]) -> float:
+def value_at(found: Formula, given: list[Formula], values: tuple[float, ...]) -> float:
     """The formula at other values of its symbols."""
     writer = SympyWriter()
     names = [writer.symbol(one) for one in given]
@@ -56,7 +56,7 @@ def test_every_operation(op: str) -> None:
     assert found.value == evaluate_floats(kernel, {"p": list(AT)})["r"][0]
     for values in (AT, ELSEWHERE):
         (wanted,) = evaluate_floats(kernel, {"p": list(values)})["r"]
-        assert at(found, given, values) == pytest.approx(wanted, rel=1e-13, abs=1e-14)
+        assert value_at(found, given, values) == pytest.approx(wanted, rel=1e-13, abs=1e-14)
 
 
 @pytest.mark.parametrize(
@@ -74,7 +74,7 @@ def test_what_packing_asks_of_numbers(function: Any) -> None:
     found = function(given)
     assert [one.value for one in found] == list(function(list(AT)))
     for one, wanted in zip(found, function(list(ELSEWHERE)), strict=True):
-        assert at(one, given, ELSEWHERE) == pytest.approx(wanted, rel=1e-13)
+        assert value_at(one, given, ELSEWHERE) == pytest.approx(wanted, rel=1e-13)
 
 
 def test_what_cancels_is_gone() -> None:

@@ -25,14 +25,14 @@ def astray(scene: Scene) -> Scene:
     return scene
 
 
-def held() -> Scene:
+def held_four_bar() -> Scene:
     scene = astray(four_bar(0.9, speed=2.0))
     scene["hinge"][0]["hold"] = True
     return scene
 
 
 MADE: dict[str, Callable[[], Scene]] = {
-    "four-bar": held, "driven": lambda: astray(four_bar(foot={"drive": "0.9 + 2*t"})),
+    "four-bar": held_four_bar, "driven": lambda: astray(four_bar(foot={"drive": "0.9 + 2*t"})),
     "platform": lambda: astray(legs()), "bead": lambda: cycloid(0.4),
     "flexible": lambda: astray(slider_crank()),
 }  # fmt: skip

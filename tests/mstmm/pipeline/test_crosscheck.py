@@ -32,7 +32,7 @@ def reports() -> dict[tuple[str, str], CrossCheckReport]:
     return {}
 
 
-def linked(kind: str, name: str) -> set[str]:
+def c_kernel_names(kind: str, name: str) -> set[str]:
     """The kernels of an element that have a C function."""
     element = prebuilt_kernels.elements().get((kind, name))
     return set(element.functions) if element else set()
@@ -49,7 +49,7 @@ def test_element_agrees(
         derived |= (kind, name) in INSTANCES
         assert (kernel.equations is None) == derived
         assert kernel.compiled is not None
-        assert kernel.interpreted == (kernel.kernel not in linked(kind, name))
+        assert kernel.interpreted == (kernel.kernel not in c_kernel_names(kind, name))
         assert kernel.points - kernel.stopped >= 2
     if kind in ("hinge", "body", "force") or name.startswith(("generic", "laws")):
         assert report.statements

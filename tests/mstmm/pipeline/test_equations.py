@@ -41,7 +41,7 @@ def rods(*hinges: dict[str, Any], **more: Any) -> mstmm.Scene:
     )
 
 
-def closed(of: mstmm.Scene | mstmm.Model, keep: tuple[str, ...] | list[str] = ()) -> Any:
+def closed_equations(of: mstmm.Scene | mstmm.Model, keep: tuple[str, ...] | list[str] = ()) -> Any:
     found = mstmm.equations(of, keep).closed
     assert isinstance(found, SymbolicEquations)
     return found
@@ -49,7 +49,7 @@ def closed(of: mstmm.Scene | mstmm.Model, keep: tuple[str, ...] | list[str] = ()
 
 def test_a_double_pendulum_is_that_of_lagrange() -> None:
     """In every mass, length, angle and speed."""
-    found = closed(rods({}, {}), NAMES)
+    found = closed_equations(rods({}, {}), NAMES)
     m1, c1, j1, l1, m2, c2, j2, g = (found.parameters[name] for name in NAMES)
     time, q = sp.Symbol("t"), sp.Matrix(mechanics.dynamicsymbols("q1 q2"))
     u = q.diff(time)
@@ -88,7 +88,7 @@ def test_closed_equations_are_those_that_the_engine_computes(
 ) -> None:
     """M and h at states far from the start, where other branches are in force."""
     model = mstmm.compile(SCENES[name], engine="looped")
-    found, free = closed(model), list(closed(model).free_speed_indices)
+    found, free = closed_equations(model), list(closed_equations(model).free_speed_indices)
     for _ in range(3):
         q, u = rng.uniform(-1.5, 1.5, model.nq), rng.uniform(-2, 2, model.nu)
         if name == "a ball and a slider":
@@ -110,7 +110,7 @@ def test_closed_equations_are_those_that_the_engine_computes(
 
 def test_numbers_of_the_start_come_with_the_symbols() -> None:
     scene = mstmm.load_scene(EXAMPLES / "simple_pendulum" / "scene.toml")
-    found = closed(scene, ["pendulum.mass", "gravity[1]"])
+    found = closed_equations(scene, ["pendulum.mass", "gravity[1]"])
     m, g = found.parameters.values()
     q = found.coordinates[0].symbol
     assert sp.ImmutableMatrix([[m]]) == found.M
@@ -125,7 +125,7 @@ def test_an_input_of_a_law_and_of_a_load_stays_a_symbol(value: float) -> None:
     scene = rods({"law": {"effort": "3*push"}}, input=[
         {"name": "push", "value": value, "rates": [0.3, 0.4]}, {"name": "pull", "value": value}
     ], load=[{"on": "rod1.tip", "force": ["pull * t", 0, 0]}])  # fmt: skip
-    found = closed(scene)
+    found = closed_equations(scene)
     q, t = found.coordinates[0].symbol, sp.Symbol("t", real=True)
     push, pull = found.inputs["push"], found.inputs["pull"]
     lever = sp.Rational("0.3") * sp.Rational("2.5") * sp.Rational("9.81")
@@ -141,7 +141,7 @@ def test_a_drive_that_follows_an_input_has_its_rates_as_symbols() -> None:
         given = {"name": "turn", "value": value, "rates": list(rates)}
         return rods({"drive": "2 * turn"}, {}, input=[given])
 
-    found = closed(scene(0.0, 0.0, 0.0))
+    found = closed_equations(scene(0.0, 0.0, 0.0))
     model = mstmm.compile(scene(0.4, 0.7, -0.9), engine="looped")
     needed = model.inverse_dynamics([0.8, 0.3], [1.4, -0.5], [-1.8, 0.0])[1]
     values = {"turn": 0.4, "turn.rates[0]": 0.7, "turn.rates[1]": -0.9}

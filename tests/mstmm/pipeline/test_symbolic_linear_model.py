@@ -42,10 +42,10 @@ def check_numbers(linear: Linear, found: SymbolicLinearModel, values: dict[str, 
     for name in MATRICES:
         matrix, expected = getattr(found, name), getattr(other, name)
         numbers = matrix.subs({found.symbols[key]: value for key, value in values.items()})
-        assert apart(numbers, expected) < 1e-12, name
+        assert relative_difference(numbers, expected) < 1e-12, name
 
 
-def apart(matrix: sp.Matrix, expected: Array) -> float:
+def relative_difference(matrix: sp.Matrix, expected: Array) -> float:
     """Largest difference over the largest entry."""
     assert matrix.shape == expected.shape
     scale = np.abs(expected).max(initial=0) or 1.0
@@ -170,7 +170,12 @@ def test_a_spatial_arm_at_other_values(
     found = linear.symbolic(keep)
     assert list(found.symbols) == keep
     for name in MATRICES:
-        assert apart(getattr(found, name).subs(found.symbol_values), getattr(linear, name)) < 1e-12
+        assert (
+            relative_difference(
+                getattr(found, name).subs(found.symbol_values), getattr(linear, name)
+            )
+            < 1e-12
+        )
     known = model.parameters
     for _ in range(2):
         values = {
@@ -215,8 +220,8 @@ def test_coordinates_along_a_drive_stay_numbers() -> None:
         at = {**found.symbol_values, found.symbols["elbow.angle"]: angle}
         state = replace(linear.state, q=np.array([0.4, angle]))
         moved = replace(linear, state=state)
-        assert apart(found.K.subs(at), moved.K) < 1e-12
-        assert apart(found.C.subs(at), moved.C) < 1e-12
+        assert relative_difference(found.K.subs(at), moved.K) < 1e-12
+        assert relative_difference(found.C.subs(at), moved.C) < 1e-12
     with pytest.raises(
         SceneError, match=r'keep "motor.angle": expected a free coordinate.*that a drive imposes'
     ):

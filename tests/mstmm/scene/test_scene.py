@@ -19,12 +19,12 @@ from mstmm.scene import Hinge, Scene, load_scene
 from mstmm.scene.tables.law import SpringLaw
 from tests.reference.random_scenes import random_scene
 from tests.support.paths import ROOT
-from tests.support.scenes.minimal import arm, body, changed, hinge, one
+from tests.support.scenes.minimal import arm, body, change_value, hinge, one_rod
 from tests.support.work import calls
 
 
 def the_hinge(**changes: Any) -> Hinge:
-    return Scene(**one(**changes)).hinge[0]
+    return Scene(**one_rod(**changes)).hinge[0]
 
 
 # --- defaults and normal forms --------------------------------------------------------------------
@@ -59,8 +59,10 @@ def test_units_of_efforts() -> None:
 
 
 def test_inertia_of_three_or_six_entries() -> None:
-    short = Scene(**one()).body[0]
-    full = Scene(**changed(one(), "body", 0, "inertia", to=[3, 2, 2.5, 0.1, -0.2, 0.3])).body[0]
+    short = Scene(**one_rod()).body[0]
+    full = Scene(
+        **change_value(one_rod(), "body", 0, "inertia", to=[3, 2, 2.5, 0.1, -0.2, 0.3])
+    ).body[0]
     assert short.inertia == (0.001, 0.084, 0.084, 0.0, 0.0, 0.0)
     assert full.inertia_matrix == ((3, 0.1, -0.2), (0.1, 2, 0.3), (-0.2, 0.3, 2.5))
 
@@ -69,22 +71,22 @@ def test_inertia_of_three_or_six_entries() -> None:
     "inertia", [[0, 0, 0], [1, 1, 2], [0, 1 / 12, 1 / 12], [1e-9, 1e-9, 2e-9], [1, 1.2, 2.2000001]]
 )
 def test_limiting_inertias_are_accepted(inertia: list[float]) -> None:
-    assert Scene(**changed(one(), "body", 0, "inertia", to=inertia)).warnings == ()
+    assert Scene(**change_value(one_rod(), "body", 0, "inertia", to=inertia)).warnings == ()
 
 
 @pytest.mark.parametrize("at", ["scene", "body"])
 def test_unphysical_inertia_is_accepted_when_asked_and_warned_about(at: str) -> None:
-    data = changed(one(), "body", 0, "inertia", to=[1, 1, 3])
+    data = change_value(one_rod(), "body", 0, "inertia", to=[1, 1, 3])
     allowed = data | {"allow_unphysical_inertia": True}
     if at == "body":
-        allowed = changed(data, "body", 0, "allow_unphysical_inertia", to=True)
+        allowed = change_value(data, "body", 0, "allow_unphysical_inertia", to=True)
     (warning,) = Scene(**allowed).warnings
     assert warning.startswith('body "rod1": inertia: the principal moments [1, 1, 3] kg m^2')
 
 
 @pytest.mark.parametrize("inertia", [[1, 1, -1], [1, 1, 1, 2, 0, 0]])
 def test_negative_moments_are_accepted_when_asked_and_warned_about(inertia: list[float]) -> None:
-    data = changed(one(), "body", 0, "inertia", to=inertia)
+    data = change_value(one_rod(), "body", 0, "inertia", to=inertia)
     (warning,) = Scene(**data, allow_unphysical_inertia=True).warnings
     assert warning.startswith('body "rod1": inertia: the principal moments [-1, 1, ')
     assert warning.count(
@@ -94,7 +96,7 @@ def test_negative_moments_are_accepted_when_asked_and_warned_about(inertia: list
 
 def test_rounding_below_zero_counts_as_zero_and_is_said_once() -> None:
     """As programs for drawing write the inertia of thin parts."""
-    dusty = [{**one()["body"][0], "name": f"rod{k}", "inertia": [-5e-20, 1e-3, 1e-3]}
+    dusty = [{**one_rod()["body"][0], "name": f"rod{k}", "inertia": [-5e-20, 1e-3, 1e-3]}
              for k in range(3)]  # fmt: skip
     hinges = [{"name": f"pin{k}", "type": "pin", "inboard": "ground", "outboard": f"rod{k}"}
               for k in range(3)]  # fmt: skip
@@ -104,7 +106,7 @@ def test_rounding_below_zero_counts_as_zero_and_is_said_once() -> None:
         "write 0",
     )
     assert scene.body[0].inertia_matrix[0][0] == 0.0
-    (small,) = Scene(**changed(one(), "body", 0, "inertia", to=[-5e-20] * 3)).warnings
+    (small,) = Scene(**change_value(one_rod(), "body", 0, "inertia", to=[-5e-20] * 3)).warnings
     assert "is treated as zero" in small
 
 
@@ -114,7 +116,7 @@ def test_an_inertia_is_judged_free_of_its_axes(rng: np.random.Generator) -> None
         for moments, good in (([1, 2, 2.9], True), ([1, 2, 3.1], False)):
             j = basis @ np.diag(moments) @ basis.T
             entries = [j[0, 0], j[1, 1], j[2, 2], j[0, 1], j[0, 2], j[1, 2]]
-            data = changed(one(), "body", 0, "inertia", to=entries)
+            data = change_value(one_rod(), "body", 0, "inertia", to=entries)
             scene = Scene(**data, allow_unphysical_inertia=True)
             assert (scene.warnings == ()) is good
 
@@ -222,9 +224,9 @@ def test_frozen() -> None:
 
 
 def test_where_things_are() -> None:
-    data = one(orientation=[0, 0, np.pi / 2])
+    data = one_rod(orientation=[0, 0, np.pi / 2])
     data["body"][0]["ends"]["tip"] = {"position": [1, 2, 3], "orientation": [1, 0, 0, 1]}
-    scene = Scene(**changed(data, "hinge", 0, "outboard", to="rod1.tip"))
+    scene = Scene(**change_value(data, "hinge", 0, "outboard", to="rod1.tip"))
     joint, rod = scene.hinge[0], scene.body[0]
     assert (joint.inboard_body, joint.inboard_end) == ("ground", "")
     assert (joint.outboard_body, joint.outboard_end) == ("rod1", "tip")
@@ -310,7 +312,7 @@ def test_round_trip_of_the_examples(path: Path) -> None:
 
 
 def test_the_echo_says_every_default() -> None:
-    text = Scene(**one()).to_toml()
+    text = Scene(**one_rod()).to_toml()
     for line in (
         "schema_version = 1",
         "gravity = [0.0, 0.0, -9.81]",
@@ -369,7 +371,7 @@ def test_a_body_as_light_as_a_slip_of_units_is_warned_about() -> None:
     """1000 m with 1 kg: a rod of 1 m whose lengths were written in mm."""
     rod = {"mass": 1.0, "center_of_mass": [500, 0, 0], "inertia": [1.0, 84e3, 84e3]}
     rod = {"name": "rod1", **rod}
-    (risk,) = Scene(**one() | {"body": [rod]}).risks
+    (risk,) = Scene(**one_rod() | {"body": [rod]}).risks
     assert risk.name == "proportions" and "500 m with a mass of 1 kg" in risk.description
     assert not risk.invalidates
-    assert not Scene(**one() | {"body": [rod | {"mass": 500.0}]}).risks
+    assert not Scene(**one_rod() | {"body": [rod | {"mass": 500.0}]}).risks

@@ -16,9 +16,9 @@ from hypothesis import HealthCheck, given, settings
 from mstmm.errors import SceneError
 from mstmm.scene import Scene, load_scene
 from tests.fuzz.mutate import places
-from tests.mstmm.scene.tables.test_elastic import arrays, linked
+from tests.mstmm.scene.tables.test_elastic import arrays, link_scene
 from tests.reference.random_scenes import random_scene
-from tests.support.scenes.minimal import arm, beam, bladed, hinge
+from tests.support.scenes.minimal import arm, beam, blade_scene, hinge
 
 KEYS = (
     "name type mass inertia ends tip axis axis2 lead normal initial q u law drive release "
@@ -47,7 +47,7 @@ VALUES = st.recursive(
 )
 
 
-def damaged(data: dict[str, Any], draw: st.DataObject) -> dict[str, Any]:
+def damage_data(data: dict[str, Any], draw: st.DataObject) -> dict[str, Any]:
     """Replace, remove or add a few values."""
     data = copy.deepcopy(data)
     for _ in range(draw.draw(st.integers(1, 3))):
@@ -86,7 +86,7 @@ def check_damaged(scene: Callable[[], dict[str, Any]], count: int) -> None:
     @settings(max_examples=count, deadline=None, suppress_health_check=SLOW)
     @given(st.data())
     def check_one(draw: st.DataObject) -> None:
-        data = damaged(scene(), draw)
+        data = damage_data(scene(), draw)
         check(lambda: Scene(**data))
 
     check_one()
@@ -108,8 +108,8 @@ def flexible() -> dict[str, Any]:
     divided = beam(mass_per_length=..., bending_stiffness=..., section=pieces, damping=[0.1] * 6,
                    frame="tangent@mid", ends={"mid": 5.0}, initial={"eta": [0.1] * 6})  # fmt: skip
     shaped = beam("flap", shapes={"y": ["(x/L)^2"]}, modes=..., rotary_inertia=1e-3)
-    link = linked(arrays(), name="tail", frame="tangent")["elastic"][0]
-    return bladed() | {
+    link = link_scene(arrays(), name="tail", frame="tangent")["elastic"][0]
+    return blade_scene() | {
         "beam": [divided, shaped], "elastic": [link],
         "hinge": [
             hinge("hub", outboard="blade"),
@@ -134,7 +134,7 @@ def test_damaged_flexible_scenes(count: int) -> None:
 @settings(max_examples=60, deadline=None, suppress_health_check=SLOW)
 @given(st.integers(0, 2**32 - 1), st.data())
 def test_damaged_random_scenes(seed: int, draw: st.DataObject) -> None:
-    data = damaged(random_scene(seed, most=4, laws=False), draw)
+    data = damage_data(random_scene(seed, most=4, laws=False), draw)
     check(lambda: Scene(**data))
 
 

@@ -154,7 +154,7 @@ class Shapes:
         values, slopes = self.rows(x, d), self.rows(x, d + 1)
         return np.stack([values[:, 3], -slopes[:, 2], slopes[:, 1]], axis=1)
 
-    def carried(self, x: Array) -> Array:
+    def inertia_rotation(self, x: Array) -> Array:
         """Rotation that turns the section's inertia: without rotary inertia, twist and what the
         frame takes off alone."""
         turn = self.rotation(x)
@@ -245,7 +245,7 @@ class Shapes:
     def points_second(self) -> Array:
         """Second derivatives (m, 3, n, n) of the displacement of all particles: a section turns by
         exp(theta~) = 1 + theta~ + theta~ theta~ / 2."""
-        second, theta = self.second(self.x), self.carried(self.x)
+        second, theta = self.second(self.x), self.inertia_rotation(self.x)
         crosses = np.array([tilde(t) for t in theta])
         both = _symmetric(np.einsum("mkab,mlbc->mklac", crosses, crosses)) / 2
         offsets = self._offsets()
@@ -256,7 +256,7 @@ class Shapes:
     def points(self) -> tuple[Array, Array, Array]:
         """Places, displacements per mode and masses of all particles."""
         mass, offsets = self.section[0], self._offsets()
-        axis, turn = self.rows(self.x)[:, :3], self.carried(self.x)
+        axis, turn = self.rows(self.x)[:, :3], self.inertia_rotation(self.x)
         place = np.array([[x, *o[1:]] for x in self.x for o in offsets])
         field = [axis[i] + np.cross(turn[i].T, o).T for i in range(len(self.x)) for o in offsets]
         return place, np.array(field), np.repeat(self.w * mass / 4, 4)

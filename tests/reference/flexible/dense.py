@@ -186,7 +186,7 @@ def _inboard(system: System, number: int, states: Mapping[int, State], y: Array)
     return place, attitude @ (own.T @ hinge.Ro)
 
 
-def predicted(
+def predicted_pose(
     system: System,
     number: int,
     states: Mapping[int, State],
@@ -212,12 +212,12 @@ def motion(system: System, q: Array, u: Array) -> dict[int, State]:
         hinge = tree.hinges[number]
         n = 0 if hinge.parent < 0 else system.bodies[hinge.parent].n
         y, du = np.zeros((1, 6 + n)), np.zeros((1, hinge.u.stop - hinge.u.start))
-        place, attitude = predicted(system, number, states, y, q, u, du)
+        place, attitude = predicted_pose(system, number, states, y, q, u, du)
         own = system.modal.get(hinge.child, slice(0, 0))
         eta, etad = etas[own], etads[own]
         end = system.bodies[hinge.child].ends[system.ends[number][1]]
         at, turned = section_jet(end, Jet(eta[None], etad[None], np.zeros((1, len(eta)))))
-        A = attitude @ turned.transposed
+        A = attitude @ turned.transpose
         r = place - apply(A, at)
         w = kinematics.angular(A).x[0]
         states[hinge.child] = State(A.x[0], r.x[0], w, r.dx[0], eta, etad)
@@ -300,7 +300,7 @@ def kinetic_energy(body: Body, state: State, lagrangian: bool) -> float:
     return 0.5 * float(y @ mass_matrix(body, state.eta, lagrangian) @ y)
 
 
-def _rotated(A: Array, n: int) -> Array:
+def _block_rotation(A: Array, n: int) -> Array:
     return scipy.linalg.block_diag(A, A, np.eye(n)) if n else scipy.linalg.block_diag(A, A)
 
 
@@ -355,7 +355,7 @@ def solve(
             matrix[at, rows] += sign * J
             matrix[rows, at] += sign * J.T
             right[at] -= sign * b
-    x = _refined(matrix, right)
+    x = _refined_solution(matrix, right)
     modes = [x[starts[i] + 6 : starts[i + 1]] for i in this.flexible]
     wrenches = x[total : total + 6 * hinges].reshape(hinges, 6)
     speeds = x[total + 6 * hinges : count]
@@ -417,7 +417,7 @@ def _body_rows(this: System, body: Body, state: State) -> tuple[Array, Array]:
     if body.drag is not None:
         speeds = np.concatenate([state.A.T @ state.v, state.A.T @ state.w, state.etad])
         h += moments(body.drag, state.eta, this.lagrangian) @ speeds
-    T = _rotated(state.A, body.n)
+    T = _block_rotation(state.A, body.n)
     return T @ M @ T.T, -T @ h
 
 
@@ -440,7 +440,7 @@ def _hinge_rows(
     n = 6 + (this.bodies[p].n if p >= 0 else 0)
     count = hinge.u.stop - hinge.u.start
     batch = _units(n + count)
-    J, b = _affine(*predicted(this, j, states, batch[:, :n], q, u, batch[:, n:]))
+    J, b = _affine(*predicted_pose(this, j, states, batch[:, :n], q, u, batch[:, n:]))
     Jc, bc = _affine(*end_jet(this.bodies[c], end, states[c], _units(6 + this.bodies[c].n)))
     child = slice(starts[c], starts[c + 1])
     matrix[at, child] += Jc
@@ -454,7 +454,7 @@ def _hinge_rows(
     right[at] = b - bc
 
 
-def _refined(matrix: Array, right: Array) -> Array:
+def _refined_solution(matrix: Array, right: Array) -> Array:
     """Solution of the equilibrated system, refined with residuals in extended precision."""
     scale_c = 1.0 / np.abs(matrix).max(axis=0)
     scale_r = 1.0 / np.abs(matrix * scale_c).max(axis=1)

@@ -135,8 +135,8 @@ def spectral(
     to_series = np.linalg.inv(legendre.legvander(x, nodes - 1))
     powers = [legendre.legint(np.eye(nodes)[k], lbnd=-1) for k in range(nodes)]
     inner = np.array([legendre.legval(x, p) for p in powers]).T @ to_series / 2
-    shapes = np.array([_integrated(k, xi) for k in range(order + 1)]).T
-    ends = np.array([_integrated(k, np.array([1.0]))[0] for k in range(order + 1)])
+    shapes = np.array([_legendre_integral(k, xi) for k in range(order + 1)]).T
+    ends = np.array([_legendre_integral(k, np.array([1.0]))[0] for k in range(order + 1)])
     curvature = np.array([_curvature(k, xi) for k in range(order + 1)]).T
     count = len(beams) * nodes
     columns = 0
@@ -171,7 +171,7 @@ def spectral(
     return Chain(K, B, S, first_moment, reach, offset, gravity, mass=mass, path=path)
 
 
-def _integrated(k: int, xi: Array) -> Array:
+def _legendre_integral(k: int, xi: Array) -> Array:
     """1 for k = 0, else the integral from 0 of the Legendre polynomial of degree k - 1."""
     if k == 0:
         return np.ones_like(xi)
@@ -239,7 +239,7 @@ def segments(
     return Chain(K, np.eye(count), S, first, lengths, offset, gravity)
 
 
-def extrapolated(values: Sequence[Array]) -> tuple[Array, float]:
+def extrapolated_limit(values: Sequence[Array]) -> tuple[Array, float]:
     """Limit of values at N, 2 N, ... with errors in even powers of 1/N, and its last correction."""
     table = [np.asarray(v, float) for v in values]
     power = 4.0

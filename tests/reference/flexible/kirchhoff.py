@@ -74,22 +74,22 @@ class Load:
     follower: bool = False
 
     def __mul__(self, factor: float) -> Load:
-        def scaled(v: Vector) -> Vector:
+        def scaled_vector(v: Vector) -> Vector:
             return (factor * v[0], factor * v[1], factor * v[2])
 
-        force, moment, spread = map(scaled, (self.force, self.moment, self.per_length))
+        force, moment, spread = map(scaled_vector, (self.force, self.moment, self.per_length))
         return replace(self, force=force, moment=moment, per_length=spread)
 
-    def at(self, attitude: Array) -> tuple[Array, Array]:
+    def tip_load(self, attitude: Array) -> tuple[Array, Array]:
         """Force and moment on the tip's section (3,), in axes of the root."""
         force, moment = np.array(self.force), np.array(self.moment)
         if self.follower:
             force, moment = attitude @ force, attitude @ moment
         return force, moment + np.cross(attitude @ np.array(self.arm), force)
 
-    def turned(self, attitude: Array) -> Array:
+    def rotation_derivative(self, attitude: Array) -> Array:
         """Derivative (6, 3) of force and moment by the section's rotation."""
-        force, moment = self.at(attitude)
+        force, moment = self.tip_load(attitude)
         if self.follower:
             return -np.vstack([cross(force), cross(moment)])
         return np.vstack([np.zeros((3, 3)), cross(force) @ cross(attitude @ np.array(self.arm))])
@@ -154,7 +154,9 @@ class State:
         """
         places = np.linspace(0.0, self.rod.length, count + 1)
         _, motion, rows = march(self.rod, self.load, self.root, places=places, full=True)
-        ends = np.hstack([np.zeros((6, 3)), -self.load.turned(self.attitude), np.eye(6)])
+        ends = np.hstack(
+            [np.zeros((6, 3)), -self.load.rotation_derivative(self.attitude), np.eye(6)]
+        )
         free = np.linalg.svd(ends @ motion)[2][6:].T
         turned = rows[:, STATE:].reshape(-1, 12, 12)[:, 3:6] @ free
         # Of the six free motions three are translations, which turn nothing.
@@ -245,8 +247,8 @@ def _miss(rod: Rod, load: Load, root: Array, square: float = 0.0) -> tuple[Array
     """Force and moment at the tip less the load's (6,), and their derivatives (6, 6)."""
     end, motion, _ = march(rod, load, root, square)
     attitude = end[A_].reshape(3, 3)
-    miss = np.concatenate([end[N_], end[M_]]) - np.concatenate(load.at(attitude))
-    return miss, motion[LOADED] - load.turned(attitude) @ motion[3:6]
+    miss = np.concatenate([end[N_], end[M_]]) - np.concatenate(load.tip_load(attitude))
+    return miss, motion[LOADED] - load.rotation_derivative(attitude) @ motion[3:6]
 
 
 def _newton(rod: Rod, load: Load, root: Array) -> Array | None:
@@ -285,15 +287,15 @@ def solve(rod: Rod, load: Load, start: State | None = None) -> State:
 
 
 def _between(a: Load, b: Load, part: float) -> Load:
-    def mixed(x: Vector, y: Vector) -> Vector:
+    def interpolated_vector(x: Vector, y: Vector) -> Vector:
         one, two, three = (1 - part) * np.array(x) + part * np.array(y)
         return (one, two, three)
 
     return replace(
         b,
-        force=mixed(a.force, b.force),
-        moment=mixed(a.moment, b.moment),
-        per_length=mixed(a.per_length, b.per_length),
+        force=interpolated_vector(a.force, b.force),
+        moment=interpolated_vector(a.moment, b.moment),
+        per_length=interpolated_vector(a.per_length, b.per_length),
     )
 
 

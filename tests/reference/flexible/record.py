@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from .inextensible import Array, Beam, Chain, extrapolated, segments, spectral, spin_up
+from .inextensible import Array, Beam, Chain, extrapolated_limit, segments, spectral, spin_up
 
 FILE = Path(__file__).with_name("converged.json")
 GRAVITY = 9.81
@@ -49,11 +49,11 @@ def peak(chain: Chain, speed: float, end: float = 8.0) -> dict[str, Any]:
     return {"deflection": float(local(t)), "time": t, "shortening": shortening, "across": samples}
 
 
-def released(beams: list[Beam], end: float, count: int) -> dict[str, Any]:
+def released_motion(beams: list[Beam], end: float, count: int) -> dict[str, Any]:
     """Tip over time, extrapolated."""
     times = np.linspace(0.0, end, count + 1)
     tips: list[Array] = [segments(beams, n, GRAVITY).tips(times) for n in (8, 16, 32)]
-    limit, correction = extrapolated(tips)
+    limit, correction = extrapolated_limit(tips)
     return {"t": times.tolist(), "tip": limit.tolist(), "correction": correction}
 
 
@@ -93,7 +93,7 @@ def thrown(order: int) -> dict[str, float]:
 
 def main() -> None:
     """Compute everything and write the file."""
-    record: dict[str, Any] = {name: released(*case) for name, case in RELEASED.items()}
+    record: dict[str, Any] = {name: released_motion(*case) for name, case in RELEASED.items()}
     for name, (beam, speed) in SPIN_UPS.items():
         record[name] = peak(spectral([beam], 7, clamped=True), speed)
     record["javelin"] = thrown(6)

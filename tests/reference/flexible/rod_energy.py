@@ -64,7 +64,7 @@ class Ritz:
                 break
         return np.asarray(a, float)
 
-    def fitted(self, vectors: Array) -> Array:
+    def fitted_coefficients(self, vectors: Array) -> Array:
         """Coefficients (size,) of rotation vectors (places, 3)."""
         return np.asarray(np.linalg.lstsq(self.shapes, vectors)[0].ravel(), float)
 

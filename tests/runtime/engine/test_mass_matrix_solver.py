@@ -16,7 +16,7 @@ from tests.reference.compare import fresh
 from tests.reference.jets import Array
 from tests.reference.tree import SIZES, read
 from tests.support.models import looped_model
-from tests.support.scenes.random_flexible import dressed
+from tests.support.scenes.random_flexible import varied_scene
 
 #: Relative residual of a scaled system whose condition is 1; it may grow with the condition.
 ACCURACY = 1e-13
@@ -77,7 +77,7 @@ def test_compiled_code_gives_the_same(draw: int, rng: Generator) -> None:
 
 def test_flexible_bodies_by_both_engines(rng: Generator) -> None:
     """Sections inward and outward, idle ends, drag and springs that must not be felt."""
-    scene = dressed(int(rng.integers(2**32)), most=3)
+    scene = varied_scene(int(rng.integers(2**32)), most=3)
     looped, fused = looped_model(scene), built(scene)
     q = looped.initial_state()[0]
     matrix = looped.mass_matrix(q)

@@ -123,7 +123,7 @@ def test_steps_can_be_limited(lab: Lab) -> None:
 
 
 def test_a_run_of_no_length_has_one_sample(lab: Lab) -> None:
-    run = lab.problem("harmonic", 2, 1.0).solved("dop853", 0.0, (1, 0))
+    run = lab.problem("harmonic", 2, 1.0).finished_run("dop853", 0.0, (1, 0))
     assert run.samples.t.tolist() == [0.0]
     assert run.statistics.steps == 0
     assert run.statistics.largest_step is None
@@ -132,7 +132,7 @@ def test_a_run_of_no_length_has_one_sample(lab: Lab) -> None:
 
 def test_a_system_without_state_runs(lab: Lab) -> None:
     problem = lab.problem("nothing", 0, 0.0)
-    run = problem.solved("dop853", 10.0, np.zeros(0), output_times=[0.0, 5.0, 10.0])
+    run = problem.finished_run("dop853", 10.0, np.zeros(0), output_times=[0.0, 5.0, 10.0])
     assert run.samples.t.tolist() == [0.0, 5.0, 10.0]
     assert run.samples.y.shape == (3, 0)
 
@@ -141,15 +141,15 @@ def test_a_hundred_thousand_components(lab: Lab) -> None:
     n = 100_000
     rates = 1.0 + np.arange(n) / n
     problem = lab.problem("linear_many", n, float(n))
-    run = problem.solved("dop853", 1.0, np.ones(n), rtol=1e-8, output_times=[0.37, 1.0])
+    run = problem.finished_run("dop853", 1.0, np.ones(n), rtol=1e-8, output_times=[0.37, 1.0])
     for row, t in enumerate(run.samples.t):
         assert run.samples.y[row] == pytest.approx(np.exp(-rates * t), abs=1e-9)
 
 
 def test_quadratures_do_not_steer_the_step(lab: Lab) -> None:
-    free = lab.problem("quadrature", 2, n_error=1).solved("dop853", 3.0, (1, 0), rtol=1e-8)
-    tied = lab.problem("quadrature", 2, n_error=2).solved("dop853", 3.0, (1, 0), rtol=1e-8)
-    alone = lab.problem("quadrature", 2, n_error=1).solved("dop853", 3.0, (1, 5), rtol=1e-8)
+    free = lab.problem("quadrature", 2, n_error=1).finished_run("dop853", 3.0, (1, 0), rtol=1e-8)
+    tied = lab.problem("quadrature", 2, n_error=2).finished_run("dop853", 3.0, (1, 0), rtol=1e-8)
+    alone = lab.problem("quadrature", 2, n_error=1).finished_run("dop853", 3.0, (1, 5), rtol=1e-8)
     assert free.statistics.steps < 0.2 * tied.statistics.steps
     assert np.array_equal(free.samples.t, alone.samples.t)
 
@@ -175,19 +175,19 @@ def test_stability_limited_runs_are_told_from_accurate_ones(lab: Lab, method: st
         ("harmonic", (1e4, 0.0), (1, 0), 5e-3, False),
         ("van_der_pol", (1.0,), (2, 0), 20.0, False),
     ):
-        run = lab.problem(rhs, len(y0), *parameters).solved(method, t_end, y0, **options)
+        run = lab.problem(rhs, len(y0), *parameters).finished_run(method, t_end, y0, **options)
         assert run.statistics.stability_limited is limited, (rhs, parameters)
 
 
 def test_the_stiffness_index_is_the_frequency_times_the_step(lab: Lab) -> None:
     for omega in (0.01, 1.0, 1e4):
         problem = lab.problem("harmonic", 2, omega, 0.0)
-        run = problem.solved("dop853", 60 / omega, (1, 0), step=1 / omega)
+        run = problem.finished_run("dop853", 60 / omega, (1, 0), step=1 / omega)
         assert run.statistics.largest_stiffness_index == pytest.approx(1.0, rel=0.5)
 
 
 def test_the_sum_of_local_errors_is_not_below_a_smooth_runs_error(lab: Lab) -> None:
-    run = lab.problem("mixed", 2).solved("dopri5", 2.0, (1, 1), rtol=1e-7, atol=1e-7)
+    run = lab.problem("mixed", 2).finished_run("dopri5", 2.0, (1, 1), rtol=1e-7, atol=1e-7)
     exact = np.array([math.exp(math.sin(2.0)), 0.2])
     total = run.statistics.sum_of_local_errors
     assert total is not None

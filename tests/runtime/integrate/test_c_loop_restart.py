@@ -39,7 +39,7 @@ def bouncing(lab: Lab) -> Problem:
 
 def whole(lab: Lab, case: str) -> tuple[Samples, Integrator]:
     method, options = CASES[case]
-    run = bouncing(lab).solved(method, 1.5, START, **options)
+    run = bouncing(lab).finished_run(method, 1.5, START, **options)
     return run.samples, run
 
 
@@ -167,7 +167,7 @@ def test_drawn_runs_do_not_depend_on_how_they_are_cut(lab: Lab, rng: np.random.G
     for _ in range(30):
         method, t_end, events, options = drawn(rng)
         problem, again = circling(lab, events), circling(lab, events)
-        wanted = problem.solved(method, t_end, START, **options)
+        wanted = problem.finished_run(method, t_end, START, **options)
         t, y, regular = wanted.samples.t, wanted.samples.y, wanted.samples.event == 0
         assert np.abs(y - np.stack([np.cos(t), -np.sin(t)], axis=1)).max() < 2e-7
         assert np.all(np.diff(t) >= 0.0)

@@ -22,7 +22,7 @@ from tests.support.libraries.library_recipes import (
     assert_tidy,
     entry_folders,
     false_compiler,
-    scaled,
+    library_value,
 )
 
 
@@ -33,7 +33,7 @@ def test_second_time_nothing_is_printed_or_compiled(
     assert cache.find(kernel.recipe) is None
     first = cache.library(kernel.recipe)
     assert (first.how, first.note) == ("compiled", "") and first.seconds > 0
-    assert scaled(first.path, first.key) == 21.0
+    assert library_value(first.path, first.key) == 21.0
 
     def no_process(*arguments: object, **more: object) -> None:
         raise AssertionError("a process was started")
@@ -225,7 +225,7 @@ def test_damaged_entry_is_built_again(said: str, cache_folder: Path) -> None:
     again = cache.library(kernel.recipe)
     assert again.how == "compiled" and again.path == first.path
     assert said in again.note and "\n" not in again.note
-    assert scaled(again.path, again.key) == 21.0
+    assert library_value(again.path, again.key) == 21.0
     assert cache.library(kernel.recipe).how == "cached"
     assert_tidy(cache_folder, 2 if said == "another scene" else 1)
 
@@ -239,7 +239,7 @@ def test_library_of_another_layout_is_built_again_once(cache_folder: Path) -> No
         if not refused:
             refused.append(path)
             raise EnvironmentFailure("built for ABI 0")
-        return scaled(path, key)
+        return library_value(path, key)
 
     value, built = cache.open_cached_library(kernel.recipe, opener)
     assert value == 21.0 and built.how == "compiled" and len(kernel.printed) == 2
@@ -288,7 +288,7 @@ def test_clean_spares_what_was_used_lately(cache_folder: Path) -> None:
     old, new = (cache.library(Kernel(factor=i).recipe) for i in (1, 2))
     os.utime(old.path.parent / "entry.json", (1e9, 1e9))
     assert clean_cache(cache_folder, unused=3600.0)[0] == 1
-    assert not old.path.exists() and scaled(new.path, new.key) == 14.0
+    assert not old.path.exists() and library_value(new.path, new.key) == 14.0
     count, size = clean_cache(cache_folder)
     assert count == 1 and size > 1000
     assert list(cache_folder.iterdir()) == []

@@ -18,7 +18,7 @@ from tests.support.libraries.library_recipes import (
     NOBODY,
     Kernel,
     assert_tidy,
-    scaled,
+    library_value,
     without_privileges,
 )
 
@@ -90,7 +90,7 @@ def test_folder_that_can_only_be_read_still_serves(of_nobody: Path) -> None:
         first = cache.library(kernel.recipe)
         of_nobody.chmod(0o500)
         assert cache.library(kernel.recipe).how == "cached"
-        assert scaled(first.path, first.key) == 21.0
+        assert library_value(first.path, first.key) == 21.0
         with pytest.raises(EnvironmentFailure, match=r"Permission denied.*MSTMM_CACHE"):
             cache.library(Kernel(factor=4).recipe)
         of_nobody.chmod(0o700)

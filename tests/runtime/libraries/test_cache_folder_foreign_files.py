@@ -15,7 +15,7 @@ import pytest
 from mstmm.errors import ElementError, EnvironmentFailure
 from mstmm.runtime.kernels import kernel_store
 from mstmm.runtime.libraries import cache
-from tests.support.libraries.library_recipes import Kernel, scaled
+from tests.support.libraries.library_recipes import Kernel, library_value
 
 DEEP = "[" * 100_000
 
@@ -64,7 +64,7 @@ def test_a_library_that_others_may_have_written_is_built_again(
     expose(entry)
     again = cache.library(Kernel().recipe)
     assert again.how == "compiled" and "rebuilt" in again.note
-    assert scaled(again.path, again.key) == 21.0
+    assert library_value(again.path, again.key) == 21.0
     assert not (tmp_path / "mark").exists()
 
 

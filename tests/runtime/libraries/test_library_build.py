@@ -27,7 +27,7 @@ from tests.support.libraries.library_recipes import (
     assert_tidy,
     entry_folders,
     false_compiler,
-    scaled,
+    library_value,
 )
 from tests.support.paths import TESTS
 
@@ -99,7 +99,7 @@ def test_sixteen_want_five_and_some_are_killed(
         assert entries.read(folder) is not None
     for number in range(1, 6):
         built = cache.library(Kernel(number).recipe)
-        assert scaled(built.path, built.key) == 7.0 * number
+        assert library_value(built.path, built.key) == 7.0 * number
     _wait_for_orphans(cache_folder)
     remove_leftovers(cache_folder, age=0.0)
     assert_tidy(cache_folder, 5)
@@ -152,7 +152,7 @@ def test_lock_and_compiler_end_with_their_killed_owner(
     with file_lock.file_lock(path.parent / f".{path.name}.lock", timeout=0.0) as remark:
         assert remark == ""  # nobody waits for the dead
     built = cache.library(Kernel().recipe)
-    assert scaled(built.path, built.key) == 21.0
+    assert library_value(built.path, built.key) == 21.0
     assert count_unfinished_builds(cache_folder) == remains  # young: it could be somebody's
     for left in cache_folder.glob(".building-*"):
         os.utime(left, (1e9, 1e9))
@@ -177,7 +177,7 @@ def test_owner_that_takes_too_long_is_named_and_not_waited_for(
     with locked(place.parent / f".{place.name}.lock", timeout=0.0) as remark:
         assert remark == ""
         built = cache.library(kernel.recipe)
-    assert built.how == "compiled" and scaled(built.path, built.key) == 21.0
+    assert built.how == "compiled" and library_value(built.path, built.key) == 21.0
     assert f"process {os.getpid()} on" in built.note and "1 s" in built.note
     assert_tidy(cache_folder, 1)
 
@@ -188,7 +188,7 @@ def test_file_system_without_locks(cache_folder: Path, monkeypatch: pytest.Monke
 
     monkeypatch.setattr("fcntl.flock", without)
     built = cache.library(Kernel().recipe)
-    assert scaled(built.path, built.key) == 21.0 and "no locks" in built.note
+    assert library_value(built.path, built.key) == 21.0 and "no locks" in built.note
     assert_tidy(cache_folder, 1)
 
 
@@ -208,7 +208,7 @@ def test_slower_of_two_builders_takes_what_is_there(
     monkeypatch.setattr(file_lock, "_try_lock", lambda handle: None)
     recipe = cache.Recipe(plain.name, plain.identity, sources, plain.flags)
     built = cache.library(recipe)
-    assert built.path == inner[0].path and scaled(built.path, built.key) == 21.0
+    assert built.path == inner[0].path and library_value(built.path, built.key) == 21.0
     assert_tidy(cache_folder, 1)
 
 
@@ -218,7 +218,7 @@ def test_threads_of_one_process(cache_folder: Path) -> None:
 
     def work() -> None:
         built = cache.library(kernel.recipe)
-        assert scaled(built.path, built.key) == 21.0
+        assert library_value(built.path, built.key) == 21.0
         found.append(built.how)
 
     threads = [threading.Thread(target=work) for _ in range(8)]
@@ -236,7 +236,7 @@ def test_removed_while_others_use_it(cache_folder: Path) -> None:
     def opener(path: Path, key: str) -> float:
         if not removed:
             removed.append(clean_cache(cache_folder)[0])
-        return scaled(path, key)
+        return library_value(path, key)
 
     removed: list[int] = []
     value, again = cache.open_cached_library(Kernel().recipe, opener)

@@ -17,7 +17,7 @@ from tests.support.libraries.library_recipes import (
     alive,
     assert_tidy,
     false_compiler,
-    scaled,
+    library_value,
 )
 
 #: Script of the compiler -> what the message must say.
@@ -57,7 +57,7 @@ def test_bad_compiler_is_told_and_leaves_nothing(
     assert_tidy(cache_folder, 0)
     monkeypatch.delenv("CC")
     built = cache.library(Kernel().recipe)
-    assert scaled(built.path, built.key) == 21.0
+    assert library_value(built.path, built.key) == 21.0
 
 
 @pytest.mark.parametrize("named", ["/nonexistent/gcc", "no-such-compiler -O3", "'unbalanced"])
@@ -99,7 +99,7 @@ def test_compiler_with_arguments_of_its_own(
     assert "nothing was given" in refusal(kernel)
     monkeypatch.setenv("CC", f"'{path}' -DGIVEN")
     built = cache.library(kernel.recipe)
-    assert scaled(built.path, built.key) == 21.0
+    assert library_value(built.path, built.key) == 21.0
 
 
 @pytest.mark.parametrize(
@@ -125,7 +125,7 @@ def test_compiler_that_does_not_know_a_flag(
     with pytest.raises(EnvironmentFailure, match=flags[0]):
         cache.library(needing)
     built = cache.library(replace(needing, optional=tuple(flags)))
-    assert scaled(built.path, built.key) == 21.0
+    assert library_value(built.path, built.key) == 21.0
     about = json.loads((built.path.parent / "entry.json").read_text())
     assert about["flags"] == ["-O1"]
 
@@ -199,5 +199,5 @@ def test_library_that_hangs_in_its_test_is_not_kept(
 def test_library_that_passes_its_test_is_kept(cache_folder: Path) -> None:
     more = "int mstmm_self_test(void) { return scaled(1.0) != 3.0; }"
     built = cache.library(Kernel(more=more).recipe)
-    assert scaled(built.path, built.key) == 21.0
+    assert library_value(built.path, built.key) == 21.0
     assert_tidy(cache_folder, 1)

@@ -12,7 +12,7 @@ import mstmm
 from tests.reference.compare import worst
 from tests.reference.jets import Array
 from tests.support.models import looped_model
-from tests.system.loops.test_flexible_against_tree import Scene, shackled, slider_crank
+from tests.system.loops.test_flexible_against_tree import Scene, shackled_beam, slider_crank
 
 #: Of closed states beside the one at hand, and of speeds there; halved once.
 STEPS = {"q": 2e-4, "u": 2e-3}
@@ -28,7 +28,7 @@ def by_differences(side: Callable[[float], list[Array]], step: float) -> list[Ar
     return [(4 * b - a) / 3 for a, b in zip(whole, half, strict=True)]
 
 
-@pytest.mark.parametrize("scene", [slider_crank, shackled], ids=["crank", "shackle"])
+@pytest.mark.parametrize("scene", [slider_crank, shackled_beam], ids=["crank", "shackle"])
 def test_along_closed_motions(scene: Callable[[], Scene], rng: np.random.Generator) -> None:
     """In motion, along every independent motion and speed."""
     model = looped_model(scene())
@@ -69,7 +69,7 @@ def test_by_numbers_of_the_scene() -> None:
         assert worst(found[name], by_differences(side, 1e-3)[0]) < 1e-8
 
 
-@pytest.mark.parametrize("scene", [slider_crank, shackled], ids=["crank", "shackle"])
+@pytest.mark.parametrize("scene", [slider_crank, shackled_beam], ids=["crank", "shackle"])
 def test_those_of_linear_models(scene: Callable[[], Scene]) -> None:
     """At rest, bent by weight: -M^-1 K and -M^-1 C along the independent motions."""
     made = scene()

@@ -76,15 +76,15 @@ def planar_body(rng: np.random.Generator) -> Body:
 def output_state(body: Body, state: Array) -> Array:
     """z_O from z_I (13 numbers) by Newton's law for C and Euler's law about C."""
     a_i, alpha, m_i, q_i = (state[3 * k : 3 * k + 3] for k in range(4))
-    a_c = _carried(a_i, alpha, body.omega, body.r_ic)
+    a_c = _point_acceleration(a_i, alpha, body.omega, body.r_ic)
     q_o = q_i + body.f_c - body.mass * a_c
     rate = body.j_c @ alpha + np.cross(body.omega, body.j_c @ body.omega)
     m_o = m_i + body.m_c - rate + np.cross(-body.r_ic, q_i) - np.cross(body.r_io - body.r_ic, q_o)
-    a_o = _carried(a_i, alpha, body.omega, body.r_io)
+    a_o = _point_acceleration(a_i, alpha, body.omega, body.r_io)
     return np.concatenate([a_o, alpha, m_o, q_o, [1.0]])
 
 
-def _carried(a: Array, alpha: Array, omega: Array, r: Array) -> Array:
+def _point_acceleration(a: Array, alpha: Array, omega: Array, r: Array) -> Array:
     return a + np.cross(alpha, r) + np.cross(omega, np.cross(omega, r))
 
 
@@ -98,7 +98,9 @@ def accelerations(bodies: list[Body], joints: list[Joint]) -> list[Array]:
     result = []
     for k, body in enumerate(bodies):
         a_c, alpha = solution[system.motion(k)][:3], solution[system.motion(k)][3:]
-        result.append(np.concatenate([_carried(a_c, alpha, body.omega, -body.r_ic), alpha]))
+        result.append(
+            np.concatenate([_point_acceleration(a_c, alpha, body.omega, -body.r_ic), alpha])
+        )
     return result
 
 
@@ -135,22 +137,25 @@ class _System:
         inertia = np.zeros((6, 6))
         inertia[:3, :3], inertia[3:, 3:] = body.mass * np.eye(3), body.j_c
         gyro = np.cross(body.omega, body.j_c @ body.omega)
-        blocks = {_span(self.motion(k)): inertia, _span(self.wrench(k)): -_at(-body.r_ic)}
+        blocks = {_span(self.motion(k)): inertia, _span(self.wrench(k)): -_wrench_shift(-body.r_ic)}
         if k + 1 < len(self.bodies):
             arm = body.r_io - body.r_ic + self.joints[k + 1].offset
-            blocks[_span(self.wrench(k + 1))] = _at(arm)
+            blocks[_span(self.wrench(k + 1))] = _wrench_shift(arm)
         self.add(blocks, np.concatenate([body.f_c, body.m_c - gyro]))
 
     def constrain(self, k: int) -> None:
         """Motion across hinge k and the efforts along its free directions."""
         body, joint = self.bodies[k], self.joints[k]
         right = joint.bias.copy()
-        blocks = {_span(self.motion(k)): _at(-body.r_ic).T, _span(self.free(k)): -joint.subspace}
+        blocks = {
+            _span(self.motion(k)): _wrench_shift(-body.r_ic).T,
+            _span(self.free(k)): -joint.subspace,
+        }
         right[:3] -= np.cross(body.omega, np.cross(body.omega, -body.r_ic))
         if k > 0:
             inboard = self.bodies[k - 1]
             arm = inboard.r_io - inboard.r_ic
-            blocks[_span(self.motion(k - 1))] = -_at(arm + joint.offset).T
+            blocks[_span(self.motion(k - 1))] = -_wrench_shift(arm + joint.offset).T
             right[:3] += np.cross(inboard.omega, np.cross(inboard.omega, arm))
         self.add(blocks, right)
         self.add({_span(self.wrench(k)): joint.subspace.T}, joint.effort)
@@ -160,7 +165,7 @@ def _span(part: slice) -> tuple[int, int]:
     return part.start, part.stop
 
 
-def _at(arm: Array) -> Array:
+def _wrench_shift(arm: Array) -> Array:
     """[q; m] acting `arm` away, as force and moment about the mass centre (6 x 6)."""
     shifted = np.eye(6)
     shifted[3:, :3] = np.column_stack([np.cross(arm, e) for e in np.eye(3)])

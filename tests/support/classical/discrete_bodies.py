@@ -52,7 +52,7 @@ def cross(a: Array, b: Array) -> Array:
     )
 
 
-def stacked(*columns: Array) -> Array:
+def stack_columns(*columns: Array) -> Array:
     """Columns one below the other."""
     return mpmath.matrix([entry for column in columns for entry in column])
 
@@ -125,16 +125,16 @@ class ParticleBody:
         modal = (eta, eta, eta)
         if self.modes:
             modal = (eta, c_ * eta + v["D_eta"], a_ * eta + v["B_eta"])
-        force, moment, shapes = self._summed(felt, w, wd, modal)
+        force, moment, shapes = self._inertial_loads(felt, w, wd, modal)
         force, moment = axes * force, axes * moment
         rows = [force, moment] if not self.planar else [force[:2, 0], moment[2:, 0]]
         outside = [v["f_r"], v["f_m"]]
         if self.modes:
             rows.append(shapes + v["K_f"] * eta + v["D_f"] * modal[1])
             outside.append(v["f_eta"])
-        return stacked(*rows) - stacked(*outside)
+        return stack_columns(*rows) - stack_columns(*outside)
 
-    def _summed(
+    def _inertial_loads(
         self, felt: Array, w: Array, wd: Array, modal: tuple[Array, Array, Array]
     ) -> tuple[Array, Array, Array]:
         force, moment = mpmath.zeros(3, 1), mpmath.zeros(3, 1)
@@ -204,7 +204,7 @@ class ParticleBody:
                 modal += outer.T * (axes.T * m) - inner.T * (axes.T * m_input)
                 modal += v["K_g"] * step[6:, 0]
             rows.append(modal)
-        return stacked(*rows)
+        return stack_columns(*rows)
 
     # --- the linear form --------------------------------------------------------------------------
 
@@ -224,14 +224,14 @@ class ParticleBody:
         """J_O: step -> step of (position, rotation) of the section at the output end."""
         size, shifts = self.rigid + self.modes, self.shifts
 
-        def moved(step: Array) -> Array:
+        def output_displacement(step: Array) -> Array:
             place = step[:shifts, 0] + self.arm(step)
             angle = step[shifts : self.rigid, 0]
             if self.modes:
                 angle = angle + self.slopes("O") * step[self.rigid :, 0]
-            return stacked(place, angle)
+            return stack_columns(place, angle)
 
-        return differential(moved, size)
+        return differential(output_displacement, size)
 
 
 def kernel_inputs(body: ParticleBody, kernel: Any) -> dict[str, list[Any]]:

@@ -25,7 +25,7 @@ from tests.support.classical.discrete_bodies import (
     cross,
     drawn,
     kernel_inputs,
-    stacked,
+    stack_columns,
 )
 from tests.support.classical.random_bodies import random_body
 
@@ -127,7 +127,7 @@ def _zero(body: ParticleBody) -> Array:
     return mpmath.zeros(body.rigid + body.modes, 1)
 
 
-def predicted(chain: Chain, k: int, end: str) -> Array:
+def predicted_section(chain: Chain, k: int, end: str) -> Array:
     """Position and angle of the section at the end I or O of body k (k = -1: the ground)."""
     if k < 0:
         return chain.ground
@@ -136,11 +136,11 @@ def predicted(chain: Chain, k: int, end: str) -> Array:
     if end == "O":
         place = place + body.arm(_zero(body))
     if not chain.planar:
-        return stacked(place, mpmath.zeros(3, 1))
+        return stack_columns(place, mpmath.zeros(3, 1))
     angle = body.values["theta_p"]
     if body.modes:
         angle = angle + body.slopes(end) * body.values["eta_p"]
-    return stacked(place, angle)
+    return stack_columns(place, angle)
 
 
 # --- the product ------------------------------------------------------------------------------
@@ -154,7 +154,7 @@ def by_product(chain: Chain) -> list[tuple[Array, Array]]:
             hinge, body = _matrices(chain, k)
             steps.append((hinge, body))
             total = body * hinge * total
-        return _solved(chain, steps, total)
+        return _chain_states(chain, steps, total)
 
 
 def _matrices(chain: Chain, k: int) -> tuple[Array, Array]:
@@ -197,11 +197,11 @@ def hinge_values(chain: Chain, k: int) -> dict[str, Array]:
     }  # fmt: skip
 
 
-def _solved(
+def _chain_states(
     chain: Chain, steps: list[tuple[Array, Array]], total: Array
 ) -> list[tuple[Array, Array]]:
     size, turns = chain.size, chain.size - chain.shifts
-    start = stacked(chain.ground, mpmath.zeros(size, 1), mpmath.matrix([1]))
+    start = stack_columns(chain.ground, mpmath.zeros(size, 1), mpmath.matrix([1]))
     known = total * start
     rows = [[total[size + i, size + j] for j in range(size)] for i in range(size)]
     right = [-known[size + i] for i in range(size)]
@@ -211,7 +211,7 @@ def _solved(
         right += condition[1]
     loads = mpmath.lu_solve(mpmath.matrix(rows), mpmath.matrix(right))
     assert len(loads) == size and turns
-    state = stacked(chain.ground, loads, mpmath.matrix([1]))
+    state = stack_columns(chain.ground, loads, mpmath.matrix([1]))
     found = []
     for hinge, body in steps:
         inner = hinge * state
@@ -252,14 +252,14 @@ def by_steps(chain: Chain) -> list[tuple[Array, Array]]:
         stack: list[tuple[_Affine, _Affine, _Affine, Array]] = []
         for k in reversed(range(len(chain.links))):
             body = chain.links[k].body
-            inner, modal, basis = _condensed(body, load)
+            inner, modal, basis = _condense_body(body, load)
             relation, across = _hinge(chain, k, inner)
             stack.append((relation, modal, load, basis))
             load = across
         return _outwards(chain, stack[::-1])
 
 
-def _condensed(body: ParticleBody, load: _Affine) -> tuple[_Affine, _Affine, Array]:
+def _condense_body(body: ParticleBody, load: _Affine) -> tuple[_Affine, _Affine, Array]:
     """f_I = S a_I + e, eta's step of a_I, and the base change, of a body with f_O = S a_O + e."""
     impedance, rest = body.linear()
     ports = body.output_map()
@@ -283,7 +283,7 @@ def _condensed(body: ParticleBody, load: _Affine) -> tuple[_Affine, _Affine, Arr
 def _hinge(chain: Chain, k: int, load: _Affine) -> tuple[_Affine, _Affine]:
     """a_C of a_P, and f_P of a_P, for f_C = load(a_C)."""
     link, size = chain.links[k], chain.size
-    gap = predicted(chain, k - 1, "O") - predicted(chain, k, "I")
+    gap = predicted_section(chain, k - 1, "O") - predicted_section(chain, k, "I")
     one = mpmath.eye(size)
     if link.kind in SPRINGS:
         return _sprung(chain, k, load, gap)
@@ -337,7 +337,7 @@ def _sprung(chain: Chain, k: int, load: _Affine, gap: Array) -> tuple[_Affine, _
     whole = _affine(efforts, 2 * size)
     pivot = mpmath.inverse(load.matrix - whole.matrix[:, size:])
     carried = _Affine(pivot * whole.matrix[:, :size], pivot * (whole.constant - load.constant))
-    felt = _affine(lambda a_p: across(stacked(a_p, carried(a_p))), size)
+    felt = _affine(lambda a_p: across(stack_columns(a_p, carried(a_p))), size)
     return carried, felt
 
 
@@ -357,8 +357,8 @@ Values = dict[str, Array]
 
 
 def _planar_law(chain: Chain, k: int) -> Callable[..., Array]:
-    start = predicted(chain, k - 1, "O")[2]
-    between = predicted(chain, k, "I")[2] - start
+    start = predicted_section(chain, k - 1, "O")[2]
+    between = predicted_section(chain, k, "I")[2] - start
 
     def law(v: Values, d: Array, s_p: Array, s_c: Array) -> Array:
         turn = start + s_p[0] - v["theta_s"][0]
@@ -372,7 +372,7 @@ def _planar_law(chain: Chain, k: int) -> Callable[..., Array]:
         at_rest += v["c_r"][0] * (v["C"][0] * v["phi_s"][0] + v["D_phi"][0])
         slope = v["k_1"][0] + 3 * v["k_3"][0] * x**2 + v["C"][0] * v["c_r"][0]
         moment = -at_rest - slope * (phi - v["phi_s"][0])
-        return stacked(force, mpmath.matrix([moment]))
+        return stack_columns(force, mpmath.matrix([moment]))
 
     return law
 
@@ -389,13 +389,13 @@ def _spatial_law(v: Values, d: Array, s_p: Array, s_c: Array) -> Array:
     force = v["q_s"] + cross(s_p, v["q_s"]) - (v["k_t"] + v["C"][0] * v["c_t"]) * change
     moment = v["m_s"] + cross(s_p, v["m_s"])
     moment -= (v["k_r"] + v["C"][0] * v["c_r"]) * (s_c - s_p)
-    return stacked(force, moment)
+    return stack_columns(force, moment)
 
 
 def _spatial_lever(v: Values, d: Array, f: Array) -> Array:
     force = f[:3, 0]
     moment = f[3:, 0] + cross(v["d_s"], force) + cross(d - v["d_s"], v["q_s"])
-    return stacked(force, moment)
+    return stack_columns(force, moment)
 
 
 def _outwards(
@@ -406,8 +406,8 @@ def _outwards(
     for link, (relation, modal, load, basis) in zip(chain.links, steps, strict=True):
         body = link.body
         a_i = relation(a_p)
-        motion = a_i if not body.modes else stacked(a_i, modal(a_i))
-        inner, _, _ = _condensed(body, load)
+        motion = a_i if not body.modes else stack_columns(a_i, modal(a_i))
+        inner, _, _ = _condense_body(body, load)
         step = basis * motion
         a_p = body.output_map() * step
         found.append((_state(body, step, inner(a_i), "I"), _state(body, step, load(a_p), "O", a_p)))
@@ -428,4 +428,4 @@ def _state(
     parts = [place, angle, loads[shifts:, 0], loads[:shifts, 0]]
     if body.modes:
         parts.append(body.eta(step))
-    return stacked(*parts, mpmath.matrix([1]))
+    return stack_columns(*parts, mpmath.matrix([1]))

@@ -19,7 +19,7 @@ from tests.support.classical.discrete_bodies import (
     ParticleBody,
     drawn,
     kernel_inputs,
-    stacked,
+    stack_columns,
 )
 from tests.support.classical.premises import Premises
 
@@ -73,7 +73,7 @@ def body_residual(
         start = _start(body, space)
         ends = blocks(state, inner, "I") | blocks(state, outer, "O")
         step = {name: ends[name] - start[name] for name in ends}
-        residuals = premises.linearised(body.values | start, step)
+        residuals = premises.linearised_residuals(body.values | start, step)
         if body.modes:
             residuals["balance of the modes"] -= found["W"] * inner
         return largest(residuals)
@@ -124,7 +124,7 @@ def hinge_residual(
             start["theta_O"] = values["theta_s"] + values["phi_s"]
         ends, start = _free_turn(ends, start, values, pair)
         step = {name: ends[name] - start[name] for name in ends}
-        return largest(premises.linearised(values | start, step))
+        return largest(premises.linearised_residuals(values | start, step))
 
 
 def _free_turn(ends: Values, start: Values, values: Values, pair: Pairing) -> tuple[Values, Values]:
@@ -138,7 +138,7 @@ def _free_turn(ends: Values, start: Values, values: Values, pair: Pairing) -> tu
         free = ends[f"{angle}_O"]
     else:
         return ends, start
-    return ends | {"x_turn": stacked(free)}, start | {"x_turn": 0 * stacked(free)}
+    return ends | {"x_turn": stack_columns(free)}, start | {"x_turn": 0 * stack_columns(free)}
 
 
 def _section(ends: Values, values: Values, pair: Pairing, end: str) -> Array:

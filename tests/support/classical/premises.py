@@ -44,7 +44,7 @@ class Premises:
                 found[equation.name] = matrix(equation.left, known) - value
         return found
 
-    def linearised(self, start: Values, step: Values) -> dict[str, mpmath.matrix]:
+    def linearised_residuals(self, start: Values, step: Values) -> dict[str, mpmath.matrix]:
         """Residuals at `start` plus their differential along `step` (arrays of the states)."""
         with mpmath.workdps(DIGITS):
             here = self.residuals(start)

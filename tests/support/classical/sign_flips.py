@@ -25,8 +25,8 @@ def flips(premises: tuple[Equation, ...]) -> list[Flip]:
     ]
 
 
-def flipped(premises: tuple[Equation, ...], flip: Flip) -> tuple[Equation, ...]:
-    """The premises with the sign of one term turned."""
+def flip_sign(premises: tuple[Equation, ...], flip: Flip) -> tuple[Equation, ...]:
+    """The premises with the sign of one term changed."""
     i, side, k = flip
     premise = premises[i]
     sides = {"left": premise.left, "right": premise.right}

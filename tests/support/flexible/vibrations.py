@@ -94,7 +94,7 @@ def null_space(a: Array) -> Array:
     return vt[rank:].T
 
 
-def joined(
+def hinge_equations(
     first: tuple[int, ModalPort, Array], second: tuple[int, ModalPort, Array], free: Any = ()
 ) -> list[dict[int, Array]]:
     """Equations of a hinge between two ports (body, port, turned); `free`: inertial directions
@@ -105,7 +105,9 @@ def joined(
     return [{i: ga[keep], j: -gb[keep]}]
 
 
-def held(body: tuple[int, ModalPort, Array], free: Any = ()) -> list[dict[int, Array]]:
+def ground_hinge_equations(
+    body: tuple[int, ModalPort, Array], free: Any = ()
+) -> list[dict[int, Array]]:
     """Equations of a hinge between the ground and a port."""
     i, port, turn = body
     keep = [d for d in range(6) if d not in free]

@@ -31,8 +31,8 @@ def accelerations(
     return udot
 
 
-def turned(angle: Any, x: Any, y: Any) -> Any:
-    """A plane vector turned to the left."""
+def rotated_vector(angle: Any, x: Any, y: Any) -> Any:
+    """A plane vector rotated counterclockwise by an angle."""
     return sp.Matrix([x * sp.cos(angle) - y * sp.sin(angle), x * sp.sin(angle) + y * sp.cos(angle)])
 
 

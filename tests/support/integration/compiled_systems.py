@@ -53,7 +53,7 @@ class Problem:
         system = (self.lab.ffi, self.lab.lib, self.system)
         return Integrator(*system, tableau, settings, y0, atol=atol, **own)
 
-    def solved(
+    def finished_run(
         self, method: str | Tableau, t_end: float, y0: ArrayLike, **options: Any
     ) -> Integrator:
         """A run that has finished."""

@@ -36,14 +36,14 @@ TRACED_FILES = (
 
 
 class Countdown:
-    """Sends a signal to this process when `passed` has been called `at` times, and then, where
+    """Sends a signal to this process when `count_point` has been called `at` times, and then, where
     `every` is not 0, again after so many times."""
 
     def __init__(self, number: int, at: int, every: int, count: mmap.mmap) -> None:
         self.number, self.at, self.every = number, at, every
         self.shared, self.count = count, 0
 
-    def passed(self) -> None:
+    def count_point(self) -> None:
         self.count += 1
         self.shared[:8] = struct.pack("q", self.count)
         behind = self.count - self.at
@@ -55,14 +55,14 @@ class Countdown:
 
         def hook(event: str, details: tuple[Any, ...]) -> None:
             if event in STEPS and (event == "fcntl.flock" or _inside(details[0], folder)):
-                self.passed()
+                self.count_point()
 
         sys.addaudithook(hook)
 
     def on_lines(self) -> None:
         def line(frame: FrameType, event: str, _: object) -> Any:
             if event == "line":
-                self.passed()
+                self.count_point()
             return line
 
         def call(frame: FrameType, event: str, _: object) -> Any:

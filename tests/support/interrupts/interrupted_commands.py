@@ -111,8 +111,8 @@ class Laboratory:
         self.clear()
         return content
 
-    def finished(self) -> bytes:
-        """Go on until the result is there, as a user would; nothing else may lie about then."""
+    def finish_run(self) -> bytes:
+        """Content of the result, after resuming as a user would; no other file is left then."""
         if CHECKPOINT in self.names():
             end = self.command("--resume")
             assert end.code == 0, end

@@ -29,7 +29,7 @@ from tests.support.interrupts.interrupted_commands import CHECKPOINT, RESULT, La
 PACE = 0.01
 
 
-def reached(laboratory: Laboratory) -> float:
+def checkpoint_time(laboratory: Laboratory) -> float:
     """Time of the checkpoint's last sample; -1 without one."""
     try:
         with np.load(laboratory.folder / CHECKPOINT) as file:
@@ -54,7 +54,7 @@ def until_it_ends(
         met[f"exit code {end.code}"] += 1
         assert end.code in (0, 130, -which), end
         assert (end.code == 130) == ("mstmm: interrupted" in end.err), end
-        now, names = reached(laboratory), laboratory.names()
+        now, names = checkpoint_time(laboratory), laboratory.names()
         met["leftovers"] += bool(names - {CHECKPOINT, RESULT})
         if now < 0 and RESULT in names:
             return

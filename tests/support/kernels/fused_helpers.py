@@ -121,7 +121,7 @@ class FusedLab:
         self.kernels = {kernel.name: kernel for kernel in kernels}
         self.lanes = int(self._library.lanes_width())
 
-    def one(self, name: str, inputs: Mapping[str, Any]) -> tuple[int, dict[str, Array]]:
+    def evaluate_state(self, name: str, inputs: Mapping[str, Any]) -> tuple[int, dict[str, Array]]:
         """(code, outputs) of the kernel for one state."""
         kernel = self.kernels[name]
         given = [np.array(inputs[p.name], dtype=float).ravel() for p in kernel.inputs]

@@ -11,12 +11,12 @@ from mstmm.derive.catalogue.kernels import Kernel
 from mstmm.derive.definition.derivation import Derivation
 
 
-def turned(expression: sp.Basic) -> Iterator[sp.Basic]:
+def sign_variants(expression: sp.Basic) -> Iterator[sp.Basic]:
     """The expression with the sign of one summand turned, for every summand at its top."""
     if isinstance(expression, sp.BlockMatrix):
         for i in range(expression.blocks.rows):
             for j in range(expression.blocks.cols):
-                for block in turned(expression.blocks[i, j]):
+                for block in sign_variants(expression.blocks[i, j]):
                     rows = [list(expression.blocks.row(k)) for k in range(expression.blocks.rows)]
                     rows[i][j] = block
                     yield sp.BlockMatrix(rows)
@@ -39,7 +39,7 @@ def mutants(kernel: Kernel, quantity: str) -> list[Kernel]:
     place = next(i for i, e in enumerate(derivation.definitions) if str(e.left.name) == quantity)
     return [
         replace(kernel, derivation=_with(derivation, place, right))
-        for right in turned(derivation.definitions[place].right)
+        for right in sign_variants(derivation.definitions[place].right)
     ]
 
 

@@ -23,11 +23,11 @@ class ShakenArithmetic(DoubleArithmetic):
     def __init__(self, rng: Generator) -> None:
         self._rng = rng
         self.operations = {  # type: ignore[misc]
-            name: row.value if row.truth else self._moved(row.value)
+            name: row.value if row.truth else self._perturb_operation(row.value)
             for name, row in OPERATIONS.items()
         }
 
-    def _moved(self, operation: Callable[..., float]) -> Callable[..., float]:
+    def _perturb_operation(self, operation: Callable[..., float]) -> Callable[..., float]:
         return lambda *args: operation(*args) * (1 + STEP * self._rng.uniform(-1, 1))
 
     def number(self, value: Any) -> float:

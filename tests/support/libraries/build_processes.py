@@ -16,13 +16,13 @@ sys.path.insert(0, str(Path(__file__).parents[3]))
 from mstmm.errors import EnvironmentFailure
 from mstmm.runtime.libraries import cache
 from mstmm.runtime.platform_support import file_lock, subprocesses  # noqa: F401 - before fork
-from tests.support.libraries.library_recipes import Kernel, scaled
+from tests.support.libraries.library_recipes import Kernel, library_value
 
 
 def child(factor: int) -> str:
     try:
         built = cache.library(Kernel(factor).recipe)
-        return f"{factor} {scaled(built.path, built.key):g} {built.how} {built.note}\n"
+        return f"{factor} {library_value(built.path, built.key):g} {built.how} {built.note}\n"
     except EnvironmentFailure as error:
         return f"{factor} failed: {error}\n"
 

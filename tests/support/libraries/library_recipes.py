@@ -46,8 +46,8 @@ class Kernel:
         return {"kernel.c": _TEXT.format(key=key, factor=self.factor, more=self.more)}
 
 
-def scaled(path: Path, key: str, x: float = 7.0) -> float:
-    """What the library at `path` makes of x.  OSError if it does not open or has another key."""
+def library_value(path: Path, key: str, x: float = 7.0) -> float:
+    """Value of the library at `path` for x.  OSError if it does not open or has another key."""
     ffi = cffi.FFI()
     ffi.cdef("extern const char mstmm_fused_library[]; double scaled(double x);")
     lib: Any = ffi.dlopen(str(path))

@@ -105,7 +105,7 @@ class MujocoPeer:
         return int(joint.qposadr[0]), int(joint.dofadr[0])
 
     @staticmethod
-    def _swapped(hinge: Hinge, values: Any) -> Any:
+    def _reorder_gimbal(hinge: Hinge, values: Any) -> Any:
         return values[::-1] if hinge.type == "gimbal" else values
 
     def _moving(self) -> list[Hinge]:
@@ -116,7 +116,7 @@ class MujocoPeer:
         out = np.zeros(self.model.nq)
         for hinge in self._moving():
             place, _ = self._places(hinge)
-            value = self._swapped(hinge, q[hinge.q])
+            value = self._reorder_gimbal(hinge, q[hinge.q])
             if hinge.type in ("free", "elastic"):
                 turned = hinge.Ro @ quaternion_matrix(as_jet(value[3:])).x
                 value = np.concatenate([hinge.ro + hinge.Ro @ value[:3], to_quaternion(turned)])
@@ -132,7 +132,7 @@ class MujocoPeer:
         out = np.zeros(self.model.nv)
         for hinge in self._moving():
             _, place = self._places(hinge)
-            value = np.array(self._swapped(hinge, u[hinge.u]))
+            value = np.array(self._reorder_gimbal(hinge, u[hinge.u]))
             if hinge.type in ("free", "elastic") and q is not None:
                 value[:3] = self._axes(hinge, q) @ value[:3]
             out[place : place + len(value)] = value
@@ -147,7 +147,7 @@ class MujocoPeer:
             value = np.array(qacc[place : place + len(own)])
             if hinge.type in ("free", "elastic"):
                 value[:3] = self._axes(hinge, q).T @ value[:3] - np.cross(own[3:], own[:3])
-            out[hinge.u] = self._swapped(hinge, value)
+            out[hinge.u] = self._reorder_gimbal(hinge, value)
         return out
 
     def accelerations(self, q: Any, u: Any, t: float = 0.0) -> Any:

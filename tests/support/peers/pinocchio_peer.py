@@ -76,7 +76,7 @@ class PinocchioPeer:
             joint = self.model.addJoint(parent, _joint(hinge), frame, hinge.name)
             self.joint[number] = joint
             armature = self.model.armature
-            armature[self._dof(number)] = self._swapped(hinge, laws.reflected_inertia(hinge))
+            armature[self._dof(number)] = self._reorder_gimbal(hinge, laws.reflected_inertia(hinge))
             self.model.armature = armature
         self.carrier[hinge.child] = (joint, local)
         inertia = pin.Inertia(body.mass, body.center, body.inertia)
@@ -87,7 +87,7 @@ class PinocchioPeer:
         return slice(joint.idx_v, joint.idx_v + joint.nv)
 
     @staticmethod
-    def _swapped(hinge: Hinge, values: Any) -> Any:
+    def _reorder_gimbal(hinge: Hinge, values: Any) -> Any:
         """Speeds (or efforts) in the other one's order; the gimbal's run backwards."""
         return values[::-1] if hinge.type == "gimbal" else values
 
@@ -96,7 +96,7 @@ class PinocchioPeer:
         out = pin.neutral(self.model)
         for number, joint in self.joint.items():
             hinge, own = self.tree.hinges[number], self.model.joints[joint]
-            value = self._swapped(hinge, q[hinge.q])
+            value = self._reorder_gimbal(hinge, q[hinge.q])
             if hinge.type in ("ball", "free", "elastic"):
                 value = np.concatenate([value[:-4], np.roll(value[-4:], -1)])
             out[own.idx_q : own.idx_q + own.nq] = value
@@ -107,7 +107,7 @@ class PinocchioPeer:
         out = np.zeros(self.model.nv)
         for number in self.joint:
             hinge = self.tree.hinges[number]
-            out[self._dof(number)] = self._swapped(hinge, u[hinge.u])
+            out[self._dof(number)] = self._reorder_gimbal(hinge, u[hinge.u])
         return out
 
     def back(self, v: Any) -> Any:
@@ -115,7 +115,7 @@ class PinocchioPeer:
         out = np.zeros(self.tree.nu)
         for number in self.joint:
             hinge = self.tree.hinges[number]
-            out[hinge.u] = self._swapped(hinge, v[self._dof(number)])
+            out[hinge.u] = self._reorder_gimbal(hinge, v[self._dof(number)])
         return out
 
     def accelerations(self, q: Any, u: Any, t: float = 0.0) -> Any:

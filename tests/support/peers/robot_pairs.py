@@ -22,9 +22,8 @@ from mstmm.scene.robots.urdf_reader import read_urdf
 PACKAGES = ("example-robot-data", "pybullet")
 
 
-def published(*packages: str) -> list[Path]:
-    """The URDF files of packages (all of them), without the thousand objects of pybullet's that
-    only lie about."""
+def urdf_files(*packages: str) -> list[Path]:
+    """The URDF files of packages (all of them), without the random objects of pybullet."""
     found = [one for package in packages or PACKAGES for one in files(package) or ()]
     return sorted(
         Path(str(one.locate())) for one in found
@@ -45,7 +44,7 @@ def of_peers(robot: Robot, *keys: str) -> Robot:
     return replace(robot, mimics=(), joints=tuple(joints))
 
 
-def imported(path: Path, base: str, *keys: str) -> ImportedRobot:
+def import_robot(path: Path, base: str, *keys: str) -> ImportedRobot:
     return scene_from_robot(
         of_peers(read_urdf(path.read_bytes(), path.name), *keys), ImportOptions(base)
     )
@@ -108,11 +107,11 @@ class Pair:
 def pairs(package: str) -> Iterator[tuple[str, Pair]]:
     """Every robot of a package that moves and that both read, on the ground and flying."""
     rng = np.random.default_rng(16)
-    for path in published(package):
+    for path in urdf_files(package):
         if not _is_read_by_both(path):
             continue
         for base in ("fixed", "free"):
-            one = imported(path, base)
+            one = import_robot(path, base)
             if any("fixed, because" in note.text for note in one.notes):
                 continue  # Pinocchio divides by no mass there
             if base == "fixed" and all(hinge.type == "fixed" for hinge in one.scene.hinge):
@@ -130,7 +129,7 @@ def _is_read_by_both(path: Path) -> bool:
     try:
         if not read_urdf(path.read_bytes(), path.name).links:
             return False  # a file that only includes another
-        imported(path, "fixed")
+        import_robot(path, "fixed")
     except SceneError as error:
         if "no link moves or has mass" in str(error):
             return False
@@ -144,7 +143,7 @@ def _is_read_by_both(path: Path) -> bool:
     return True
 
 
-def apart(found: Any, wanted: Any) -> float:
+def relative_difference(found: Any, wanted: Any) -> float:
     """The largest difference, in parts of the largest number."""
     scale = max(1.0, float(np.abs(wanted).max(initial=0.0)))
     return float(np.abs(found - wanted).max(initial=0.0)) / scale

@@ -78,7 +78,7 @@ def model(poisson: float = 0.3, elements: int = 20) -> ElasticModel:
 
 
 @cache
-def reduced(poisson: float, modes: int, frame: str = "tangent") -> Reduction:
+def reduction(poisson: float, modes: int, frame: str = "tangent") -> Reduction:
     """The bar's shapes, with both ends loaded."""
     found, ends = model(poisson), scene(table()).elastic[0].ends
     ports = [select_port(found, name, end, True) for name, end in ends.items()]

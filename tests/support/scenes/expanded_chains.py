@@ -23,9 +23,9 @@ def written_out(data: Data) -> Data:
             return {key: plain(x) for key, x in value.items()}
         if isinstance(value, list):
             return [plain(x) for x in value]
-        return renamed(value) if isinstance(value, str) else value
+        return rename_members(value) if isinstance(value, str) else value
 
-    def renamed(text: str) -> str:
+    def rename_members(text: str) -> str:
         text = re.sub(r"\b(\w+)\[(\d+|last)\]\.hinge", lambda m: _name(m, counts) + "_hinge", text)
         return _MEMBER.sub(lambda m: _name(m, counts) if m[1] in counts else m[0], text)
 

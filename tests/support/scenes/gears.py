@@ -21,7 +21,9 @@ def pin(name: str, body: str, **more: Any) -> Scene:
     return {"name": name, "type": "pin", "inboard": "ground", "outboard": body, **more}
 
 
-def coupled(bodies: list[Scene], hinges: list[Scene], *rows: Scene, **more: Any) -> mstmm.Model:
+def coupled_model(
+    bodies: list[Scene], hinges: list[Scene], *rows: Scene, **more: Any
+) -> mstmm.Model:
     """The model of bodies on hinges with couplings, without gravity if none is given."""
     scene = {"gravity": [0, 0, 0], "body": bodies, "hinge": hinges, "coupling": list(rows)}
     return mstmm.compile(mstmm.Scene(**scene | more))
@@ -30,7 +32,7 @@ def coupled(bodies: list[Scene], hinges: list[Scene], *rows: Scene, **more: Any)
 def pair(*rows: Scene, a: Scene | None = None, b: Scene | None = None) -> mstmm.Model:
     """Two wheels of 0.02 and 0.3 kg m^2 on pins A and B; `a` and `b` are more keys of the pins."""
     hinges = [pin("A", "a", **(a or {})), pin("B", "b", position=[1, 0, 0], **(b or {}))]
-    return coupled([wheel("a", 0.02), wheel("b", 0.3)], hinges, *rows)
+    return coupled_model([wheel("a", 0.02), wheel("b", 0.3)], hinges, *rows)
 
 
 #: Radii of sun, planets and ring, m; moments of sun, planet, ring and carrier, kg m^2; mass of a
@@ -61,7 +63,7 @@ def planetary(efforts: dict[str, float], **laws: Scene) -> mstmm.Model:
             {"name": f"sun{k}", "expression": f"{SUN}*(sun.q - carrier.q) + {PLANET}*p{k}.q"},
             {"name": f"ring{k}", "expression": f"{RING}*(ring.q - carrier.q) - {PLANET}*p{k}.q"},
         ]
-    return coupled(bodies, hinges, *rows)
+    return coupled_model(bodies, hinges, *rows)
 
 
 def inertia(ratios: np.ndarray) -> np.ndarray:

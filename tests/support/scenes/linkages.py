@@ -170,7 +170,7 @@ def bennett(angle: float, speed: float = 0.0, digits: int | None = None) -> Scen
         places.append(places[-1] + length * turned[:, 0])
         axes.append(turn[:, 2])
 
-    def told(numbers: Iterable[float]) -> list[float]:
+    def rounded_numbers(numbers: Iterable[float]) -> list[float]:
         return [float(x) if digits is None else round(float(x), digits) for x in numbers]
 
     bodies, hinges = [], []
@@ -181,17 +181,17 @@ def bennett(angle: float, speed: float = 0.0, digits: int | None = None) -> Scen
         bodies.append({
             "name": f"link{k}", "mass": 1 + k / 5,
             "inertia": [float(inertia[pair]) for pair in PAIRS],
-            "ends": {"near": told(-half), "far": told(half)},
+            "ends": {"near": rounded_numbers(-half), "far": rounded_numbers(half)},
         })  # fmt: skip
     sides = [("ground", "link0.near"), ("link0.far", "link1.near"), ("link1.far", "link2.near"),
              ("ground", "link2.far")]  # fmt: skip
     for k, (inboard, outboard) in enumerate(sides):
         hinges.append({
             "name": f"pin{k}", "type": "pin", "inboard": inboard, "outboard": outboard,
-            "axis": told(axes[k]), "cut": k == 3,
+            "axis": rounded_numbers(axes[k]), "cut": k == 3,
         })  # fmt: skip
     hinges[0]["initial"] = {"u": [speed]}
-    hinges[3]["position"] = told(places[3])
+    hinges[3]["position"] = rounded_numbers(places[3])
     return {"gravity": [0, 0, -9.81], "body": bodies, "hinge": hinges}
 
 

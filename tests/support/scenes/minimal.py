@@ -37,12 +37,12 @@ def arm(**changes: Any) -> Data:
     } | changes
 
 
-def one(**changes: Any) -> Data:
+def one_rod(**changes: Any) -> Data:
     """One rod on one hinge; `changes` are to the hinge."""
     return {"gravity": [0, 0, -9.81], "body": [body()], "hinge": [hinge(**changes)]}
 
 
-def changed(data: Data, *path: str | int, to: Any) -> Data:
+def change_value(data: Data, *path: str | int, to: Any) -> Data:
     """A copy with one value replaced; `to=...` (Ellipsis) removes the key."""
     copied = copy.deepcopy(data)
     inside: Any = copied
@@ -67,7 +67,7 @@ def beam(name: str = "blade", **changes: Any) -> Data:
     return {key: value for key, value in table.items() if value is not ...}
 
 
-def bladed(**changes: Any) -> Data:
+def blade_scene(**changes: Any) -> Data:
     """One beam on a fixed hinge; `changes` are to the beam."""
     held = {"name": "hub", "type": "fixed", "inboard": "ground", "outboard": "blade"}
     return {"gravity": [0, 0, -9.81], "beam": [beam(**changes)], "hinge": [held]}

@@ -15,7 +15,7 @@ Scene = dict[str, Any]
 Generator = np.random.Generator
 
 
-def dressed(seed: int, planar: bool = False, most: int = 4) -> Scene:
+def varied_scene(seed: int, planar: bool = False, most: int = 4) -> Scene:
     """A tree of `random_system` with hinges of every type and their laws, drag, points of
     quadrature, loads on sections and along beams, springs, and a driven hinge."""
     rng = np.random.default_rng([seed, 7])
@@ -89,6 +89,6 @@ def _drive(rng: Generator, scene: Scene) -> None:
 def drawn(seed: int, planar: bool = False, most: int = 4) -> tuple[Scene, Array, Array]:
     """Scene and a state of a seed, which is printed for a failing test."""
     print(f"engine_scenes seed = {seed}")
-    scene = dressed(seed, planar, most)
+    scene = varied_scene(seed, planar, most)
     bare = {**scene, "load": [], "spring": []}
     return scene, *random_beams.random_state(bare, seed + 1, 0.03)

@@ -110,13 +110,13 @@ def precise_accelerations(scene: Scene, q: Array, u: Array) -> Array:
             X = np.eye(6, dtype=np.longdouble)
             X[:3, 3:] = -_tilde(tip)
             X = _both(turns[i].T) @ X
-            S, e = X.T @ S @ X, X.T @ (S @ _carried(turns[i], omega[i]) + e)
+            S, e = X.T @ S @ X, X.T @ (S @ _centripetal_acceleration(turns[i], omega[i]) + e)
     a = np.concatenate([-_long(scene["gravity"]), np.zeros(3, np.longdouble)])
     udot = []
     for i, (L, Y, y) in enumerate(reversed(pivots)):
         if i:
             a = np.concatenate([a[:3] + np.cross(a[3:], tip), a[3:]])
-        a = _both(turns[i].T) @ a + (_carried(turns[i], omega[i]) if i else 0)
+        a = _both(turns[i].T) @ a + (_centripetal_acceleration(turns[i], omega[i]) if i else 0)
         udot.append(_backward(L, y - Y @ a))
         a = a + subspace @ udot[-1] + bias[i]
     return np.concatenate(udot).astype(float)
@@ -126,7 +126,7 @@ def _long(values: Any) -> Long:
     return np.asarray(values, dtype=np.longdouble)
 
 
-def _carried(turn: Long, omega: Long) -> Long:
+def _centripetal_acceleration(turn: Long, omega: Long) -> Long:
     """omega x (omega x tip) of the inboard body in outboard axes, as a twist."""
     centripetal = np.cross(omega, np.cross(omega, _long([1, 0, 0])))
     return np.concatenate([turn.T @ centripetal, np.zeros(3, np.longdouble)])

@@ -28,7 +28,7 @@ def _numbers(values: Any) -> list[float]:
     return [float(v) for v in np.asarray(values)]
 
 
-def rotated(scene: Scene, turn: Array, shift: Array) -> Scene:
+def rotate_scene(scene: Scene, turn: Array, shift: Array) -> Scene:
     """Everything that refers to inertial axes turned by `turn`; the ground's points moved too."""
     out = copy.deepcopy(scene)
     out["gravity"] = _numbers(turn @ np.array(scene["gravity"]))
@@ -55,7 +55,7 @@ def _turned_texts(turn: Array, entries: list[Any]) -> list[str]:
     ]
 
 
-def redescribed(scene: Scene, rng: np.random.Generator) -> Scene:
+def change_body_axes(scene: Scene, rng: np.random.Generator) -> Scene:
     """Body axes turned and moved at random; every end stays where it is in the body.
 
     A hinge that held a body by its origin holds it by an end "origin" then.
@@ -133,14 +133,14 @@ def split(scene: Scene, name: str, part: float, rng: np.random.Generator) -> Sce
     return out
 
 
-def permuted(scene: Scene, rng: np.random.Generator) -> Scene:
+def permute_bodies(scene: Scene, rng: np.random.Generator) -> Scene:
     """Bodies in another order: another order of the sweep, the same q and u."""
     out = copy.deepcopy(scene)
     out["body"] = [out["body"][i] for i in rng.permutation(len(out["body"]))]
     return out
 
 
-def reordered(scene: Scene, rng: np.random.Generator) -> tuple[Scene, list[int], list[int]]:
+def reorder_hinges(scene: Scene, rng: np.random.Generator) -> tuple[Scene, list[int], list[int]]:
     """Hinges in another order, and where the new q and u stand in the old ones."""
     out, tree = copy.deepcopy(scene), read(scene)
     order = rng.permutation(len(scene["hinge"]))

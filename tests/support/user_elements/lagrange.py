@@ -16,7 +16,7 @@ from scipy.integrate import solve_ivp
 Array = NDArray[np.float64]
 
 
-def integrated(
+def lagrange_motion(
     rotation: sp.Matrix,
     position: sp.Matrix,
     coordinates: Sequence[sp.Symbol],

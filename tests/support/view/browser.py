@@ -61,8 +61,8 @@ class Page:
             time.sleep(0.1)
         return None
 
-    def settled(self, fits: Callable[[bytes], bool], seconds: float = 60.0) -> bool:
-        """Does a picture of it fit, once it has drawn what it draws?"""
+    def wait_for_picture(self, fits: Callable[[bytes], bool], seconds: float = 60.0) -> bool:
+        """Whether a picture of the page fits within some seconds."""
         end = time.monotonic() + seconds
         while not fits(self.picture()):
             if time.monotonic() > end:
@@ -76,7 +76,7 @@ class Page:
 
 
 @contextmanager
-def opened(path: Path, size: tuple[int, int] = (900, 600), dark: bool = False) -> Iterator[Page]:
+def open_page(path: Path, size: tuple[int, int] = (900, 600), dark: bool = False) -> Iterator[Page]:
     """The file in a browser that finds no network."""
     from websockets.sync.client import connect
 

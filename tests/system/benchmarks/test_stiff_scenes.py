@@ -14,7 +14,7 @@ import mstmm
 from benchmarks.stiff import references, scenes
 from benchmarks.stiff.absolute_coordinates import BushedRods
 from benchmarks.stiff.cases import CASES
-from tests.support.implicit_methods.lagrange import accelerations, energy, rate, turned
+from tests.support.implicit_methods.lagrange import accelerations, energy, rate, rotated_vector
 from tests.support.implicit_methods.quarter_car import quarter_car_at
 
 Array = npt.NDArray[np.float64]
@@ -33,8 +33,11 @@ def drawn(rng: np.random.Generator, sizes: Any) -> Array:
 def test_two_rods_on_bushings_follow_lagrange(rng: np.random.Generator) -> None:
     k, zeta = 1e4, 0.1
     q, u, t = symbols(6)
-    first, second = turned(0, q[0], q[1]), turned(0, q[0], q[1]) + turned(q[2], 1 + q[3], q[4])
-    centers = (first + turned(q[2], 0.5, 0), second + turned(q[2] + q[5], 0.5, 0))
+    first, second = (
+        rotated_vector(0, q[0], q[1]),
+        rotated_vector(0, q[0], q[1]) + rotated_vector(q[2], 1 + q[3], q[4]),
+    )
+    centers = (first + rotated_vector(q[2], 0.5, 0), second + rotated_vector(q[2] + q[5], 0.5, 0))
     T = energy(1, 1 / 12, centers[0], q[2], q, u) + energy(1, 1 / 12, centers[1], q[2] + q[5], q, u)
     V = GRAVITY * (centers[0][1] + centers[1][1]) + k * sum(q[i] ** 2 for i in (0, 1, 3, 4)) / 2
     F = 2 * zeta * np.sqrt(k) * sum(u[i] ** 2 for i in (0, 1, 3, 4)) / 2
@@ -60,8 +63,8 @@ def test_half_car_follows_lagrange(rng: np.random.Generator) -> None:
     for i, (x, yaw, delay) in enumerate(scenes.WHEELS.values()):
         sign = 1 if yaw == 0 else -1
         a, b, angle = q[2 + 3 * i : 5 + 3 * i]
-        root = mass_center + turned(pitch, x + sign * a, sign * b)
-        arm = mass_center * 0 + turned(pitch + angle, sign, 0)
+        root = mass_center + rotated_vector(pitch, x + sign * a, sign * b)
+        arm = mass_center * 0 + rotated_vector(pitch + angle, sign, 0)
         T += energy(mass, inertia, root + center * arm, pitch + angle, q, u)
         tip = root + hub * arm
         length = sp.sqrt((tip[0] - x - sign * hub) ** 2 + (tip[1] + height) ** 2)

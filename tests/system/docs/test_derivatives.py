@@ -12,8 +12,8 @@ from tests.support.pages import Follow, page_text
 PAGE = "docs/howto/derivatives.md"
 
 
-def test_the_example_is_right(played: Follow) -> None:
-    page = played(PAGE)
+def test_the_example_is_right(play_page: Follow) -> None:
+    page = play_page(PAGE)
     found, model, q = (page.names[name] for name in ("found", "model", "q"))
     assert len(page.printed.splitlines()) >= 6
     assert np.allclose(found.efforts @ model.mass_matrix(q), np.eye(2), atol=1e-12)

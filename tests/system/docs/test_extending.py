@@ -13,8 +13,8 @@ PAGES = "docs/howto"
 
 
 @pytest.mark.slow
-def test_hinge(played: Follow) -> None:
-    page = played(f"{PAGES}/define-a-hinge.md")
+def test_hinge(play_page: Follow) -> None:
+    page = play_page(f"{PAGES}/define-a-hinge.md")
     assert page.printed.startswith("compiled\n")
     result = page.names["result"]
     assert result.success
@@ -23,22 +23,22 @@ def test_hinge(played: Follow) -> None:
     assert (page.folder / "kernels" / "hinge_pilot" / "element.json").is_file()
 
 
-def test_body(played: Follow) -> None:
-    page = played(f"{PAGES}/define-a-body.md")
+def test_body(play_page: Follow) -> None:
+    page = play_page(f"{PAGES}/define-a-body.md")
     gaps = [float(x) for x in re.findall(r"-?\d\.?\d*(?:e[-+]\d+)?", page.printed)]
     assert len(gaps) == 9
     assert max(map(abs, gaps)) < 1e-8
     assert np.ptp(page.names["result"].energy()) < 1e-8
 
 
-def test_force(played: Follow) -> None:
-    names = played(f"{PAGES}/define-a-force-element.md").names
+def test_force(play_page: Follow) -> None:
+    names = play_page(f"{PAGES}/define-a-force-element.md").names
     y = names["result"].position("mount")[-1, 1]
     assert 4e3 * y + 3e7 * y**3 == pytest.approx(-2 * 9.81, rel=1e-4)
     assert names["stiffer"].parameters["rubber.parameters.stiffness"] == 8e3
 
 
-def test_stepper(played: Follow) -> None:
-    printed = played(f"{PAGES}/define-an-integration-method.md").printed
+def test_stepper(play_page: Follow) -> None:
+    printed = play_page(f"{PAGES}/define-an-integration-method.md").printed
     ratios = [float(x) for x in re.findall(r"\d+\.\d+", printed)]
     assert ratios == pytest.approx([8.0, 8.0], rel=0.1)

@@ -15,9 +15,9 @@ TEXT = page_text(PAGE)
 
 
 @pytest.fixture
-def page(played: Follow) -> dict[str, Any]:
+def page(play_page: Follow) -> dict[str, Any]:
     """The names that the page leaves behind."""
-    return played(PAGE).names
+    return play_page(PAGE).names
 
 
 def words(text: str) -> str:
@@ -25,8 +25,8 @@ def words(text: str) -> str:
     return re.sub(r"(\d)\.\d+", r"\1", " ".join(text.split()))
 
 
-def test_the_rod_is_drawn(played: Follow) -> None:
-    assert (played(PAGE).folder / "rod.png").stat().st_size > 10000
+def test_the_rod_is_drawn(play_page: Follow) -> None:
+    assert (play_page(PAGE).folder / "rod.png").stat().st_size > 10000
 
 
 def test_the_spun_blade_bends_as_published(page: dict[str, Any]) -> None:

@@ -13,9 +13,9 @@ pytestmark = pytest.mark.slow
 
 
 @pytest.fixture
-def page(played: Follow) -> dict[str, Any]:
+def page(play_page: Follow) -> dict[str, Any]:
     """The names that the page leaves behind."""
-    return played("docs/tutorials/riccati-sweep.md").names
+    return play_page("docs/tutorials/riccati-sweep.md").names
 
 
 def test_both_programs_agree_with_the_engine_on_a_short_chain(page: dict[str, Any]) -> None:

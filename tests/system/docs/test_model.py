@@ -14,9 +14,9 @@ MASS, HALF, LENGTH, INERTIA, GRAVITY = 1.0, 0.5, 1.0, 0.084, 9.81
 
 
 @pytest.fixture
-def page(played: Follow) -> dict[str, Any]:
+def page(play_page: Follow) -> dict[str, Any]:
     """The names that the page leaves behind."""
-    return played("docs/howto/evaluate-a-model.md").names
+    return play_page("docs/howto/evaluate-a-model.md").names
 
 
 def weights(q: np.ndarray[Any, Any]) -> list[float]:

@@ -27,15 +27,15 @@ FOLLOWED_ELSEWHERE = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("page", [page for page in PAGES if page not in FOLLOWED_ELSEWHERE])
-def test_page_runs(page: str, played: Follow) -> None:
-    played(page)
+def test_page_runs(page: str, play_page: Follow) -> None:
+    play_page(page)
 
 
 @pytest.mark.parametrize("page", FOLLOWED_ELSEWHERE)
 def test_other_modules_follow_the_rest(page: str) -> None:
     assert page in PAGES
     text = Path(__file__).with_name(FOLLOWED_ELSEWHERE[page]).read_text("utf-8")
-    assert "played(" in text and Path(page).name in text
+    assert "play_page(" in text and Path(page).name in text
 
 
 @pytest.mark.parametrize("page", PAGES)

@@ -37,10 +37,10 @@ from mstmm.scene import (
     load_scene,
 )
 from mstmm.scene.validators.scalars_and_vectors import Table
-from tests.support.pages import Follow, page_text, shown
+from tests.support.pages import Follow, block_texts, page_text
 
 PAGE = "docs/reference/scene-format.md"
-BLOCKS = shown(PAGE, "toml")
+BLOCKS = block_texts(PAGE, "toml")
 FORMAT = page_text(PAGE)
 
 
@@ -83,6 +83,6 @@ def test_every_hinge_type_is_described() -> None:
     assert {name for name in builtin_hinges() if f"`{name}`" not in FORMAT} == set()
 
 
-def test_first_scene_has_the_energy_it_began_with(played: Follow) -> None:
-    energy = float(played(PAGE).printed.splitlines()[0].split()[-1])
+def test_first_scene_has_the_energy_it_began_with(play_page: Follow) -> None:
+    energy = float(play_page(PAGE).printed.splitlines()[0].split()[-1])
     assert energy == pytest.approx(9.81 * 0.5 * 0.29552020666134, abs=1e-6)

@@ -51,7 +51,7 @@ def rope(count: int = 6) -> Data:
     ]}  # fmt: skip
 
 
-def branched() -> Data:
+def branched_scene() -> Data:
     return {
         "gravity": [0, 1.0, -9.81],
         "body": [{"name": "weight", **BENT}],
@@ -70,11 +70,11 @@ def branched() -> Data:
     }  # fmt: skip
 
 
-def compiled(data: Data) -> Model:
+def unsimplified_model(data: Data) -> Model:
     return mstmm.compile(Scene(**data), engine="looped", simplify=False)
 
 
-def reordered(model: Model, plain: Model) -> tuple[list[int], list[int]]:
+def coordinate_places(model: Model, plain: Model) -> tuple[list[int], list[int]]:
     """Places in q and u of the scene that is written out."""
     q, u = plain.coordinate_layout.q_names, plain.coordinate_layout.u_names
     return (
@@ -83,12 +83,14 @@ def reordered(model: Model, plain: Model) -> tuple[list[int], list[int]]:
     )
 
 
-@pytest.mark.parametrize("data", [rope(), rope(1), branched()], ids=["balls", "one", "branched"])
+@pytest.mark.parametrize(
+    "data", [rope(), rope(1), branched_scene()], ids=["balls", "one", "branched"]
+)
 def test_a_chain_is_the_scene_written_out_to_the_last_bit(
     data: Data, rng: np.random.Generator
 ) -> None:
-    model, plain = compiled(data), compiled(written_out(data))
-    places_q, places_u = reordered(model, plain)
+    model, plain = unsimplified_model(data), unsimplified_model(written_out(data))
+    places_q, places_u = coordinate_places(model, plain)
     q, u = model.initial_state()
     start = plain.initial_state()
     assert np.array_equal(q, start[0][places_q]) and np.array_equal(u, start[1][places_u])
@@ -123,7 +125,7 @@ def drawn(rng: np.random.Generator) -> Data:
 @pytest.mark.parametrize("draw", range(8))
 def test_drawn_chains_are_the_scenes_written_out(draw: int, rng: np.random.Generator) -> None:
     data = drawn(np.random.default_rng([draw, int(rng.integers(2**31))]))
-    model, plain = compiled(data), compiled(written_out(data))
+    model, plain = unsimplified_model(data), unsimplified_model(written_out(data))
     q, u = model.initial_state()
     assert model.coordinate_layout.q_names == [*map(member_name, plain.coordinate_layout.q_names)]
     q, u = q + 0.3 * rng.standard_normal(model.nq), u + rng.standard_normal(model.nu)
@@ -136,7 +138,7 @@ def member_name(name: str) -> str:
 
 
 def test_names_and_places_of_the_layout() -> None:
-    layout = compiled(branched()).coordinate_layout
+    layout = unsimplified_model(branched_scene()).coordinate_layout
     assert [layout.q_name(i) for i in range(layout.nq)] == layout.q_names
     assert [layout.u_name(i) for i in range(layout.nu)] == layout.u_names
     assert list(layout.hinges)[:2] == ["hook", "rope[0].hinge"]
@@ -150,9 +152,9 @@ def test_names_and_places_of_the_layout() -> None:
 
 @pytest.fixture(scope="module")
 def runs() -> tuple[Any, Any]:
-    data = branched()
+    data = branched_scene()
     settings: Data = {"t_end": 0.1, "rtol": 1e-8, "output_times": [0, 0.05, 0.1]}
-    model, plain = compiled(data), compiled(written_out(data))
+    model, plain = unsimplified_model(data), unsimplified_model(written_out(data))
     return model.simulate(**settings), plain.simulate(**settings)
 
 
@@ -209,16 +211,20 @@ def test_results_of_chains_go_to_files_and_back(runs: tuple[Any, Any], tmp_path:
 
 def test_parameters_stand_for_all_members() -> None:
     data = rope()
-    model = compiled(data)
+    model = unsimplified_model(data)
     assert model.parameters["rope.body[0].mass"] == 1.0
     assert not any(name.startswith("rope.count") for name in model.parameters)
     heavy = model.with_parameters({"rope.body.mass": 2.5, "rope.position[2]": 4.0})
     assert heavy.scene.chain[0].body[0].mass == 2.5
     assert heavy.scene.chain[0].position == (0.0, 0.0, 4.0)
     q, u = model.initial_state()
-    wanted = compiled({**data, "chain": [data["chain"][0] | {"body": ROD | {"mass": 2.5}}]})
+    wanted = unsimplified_model(
+        {**data, "chain": [data["chain"][0] | {"body": ROD | {"mass": 2.5}}]}
+    )
     assert np.array_equal(heavy.accelerations(q, u), wanted.accelerations(q, u))
-    both = compiled(branched()).with_parameters({"side.body.mass": 3.0, "side.body[1].mass": 4.0})
+    both = unsimplified_model(branched_scene()).with_parameters(
+        {"side.body.mass": 3.0, "side.body[1].mass": 4.0}
+    )
     assert [body.mass for body in both.scene.chain[1].body] == [3.0, 4.0]
     twice = {"rope.body[0].mass": 2.5, "rope.body.mass": 4.0}
     with pytest.raises(SceneError, match="are the same number"):
@@ -229,6 +235,6 @@ def test_parameters_stand_for_all_members() -> None:
 
 def test_events_see_members() -> None:
     data = rope() | {"event": [{"when": "rope[last].tip.z < 0.9", "do": "stop"}]}
-    run = compiled(data).simulate(1.0)
+    run = unsimplified_model(data).simulate(1.0)
     assert run.success and run.t[-1] < 1.0
     assert run.position("rope[5].tip")[-1, 2] == pytest.approx(0.9, abs=1e-8)

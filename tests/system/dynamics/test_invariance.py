@@ -15,11 +15,11 @@ from tests.reference.jets import Array
 from tests.reference.random_scenes import floating_tree, random_state
 from tests.support.models import compile_scene
 from tests.support.scenes.scene_changes import (
+    change_body_axes,
     heavier,
-    permuted,
-    redescribed,
-    reordered,
-    rotated,
+    permute_bodies,
+    reorder_hinges,
+    rotate_scene,
     split,
 )
 
@@ -37,7 +37,7 @@ def deviation(scene: dict[str, Any], other: dict[str, Any], q: Array, u: Array) 
 def test_rotated_and_moved_scenes(draw: int, rng: np.random.Generator) -> None:
     scene, q, u = fresh(rng)
     turn, shift = orientation(rng.uniform(-3, 3, 3)), rng.uniform(-5, 5, 3)
-    assert deviation(scene, rotated(scene, turn, shift), q, u) < ACCURACY
+    assert deviation(scene, rotate_scene(scene, turn, shift), q, u) < ACCURACY
 
 
 @pytest.mark.parametrize("draw", DRAWS)
@@ -45,7 +45,7 @@ def test_other_body_axes(draw: int, rng: np.random.Generator) -> None:
     scene, q, u = fresh(rng)
     for load in scene["load"]:
         load["axes"] = "inertial"
-    assert deviation(scene, redescribed(scene, rng), q, u) < ACCURACY
+    assert deviation(scene, change_body_axes(scene, rng), q, u) < ACCURACY
 
 
 @pytest.mark.parametrize("draw", DRAWS)
@@ -58,7 +58,7 @@ def test_two_welded_halves_are_one_body(draw: int, rng: np.random.Generator) -> 
 @pytest.mark.parametrize("draw", DRAWS)
 def test_the_order_of_bodies_changes_nothing(draw: int, rng: np.random.Generator) -> None:
     scene, q, u = fresh(rng)
-    assert deviation(scene, permuted(scene, rng), q, u) < ACCURACY
+    assert deviation(scene, permute_bodies(scene, rng), q, u) < ACCURACY
 
 
 @pytest.mark.parametrize("draw", DRAWS)
@@ -66,7 +66,7 @@ def test_the_order_of_hinges_is_the_order_of_coordinates(
     draw: int, rng: np.random.Generator
 ) -> None:
     scene, q, u = fresh(rng)
-    other, q_places, u_places = reordered(scene, rng)
+    other, q_places, u_places = reorder_hinges(scene, rng)
     expected = compile_scene(scene).accelerations(q, u, TIME)[u_places]
     found = compile_scene(other).accelerations(q[q_places], u[u_places], TIME)
     assert worst(found, expected) < ACCURACY
@@ -130,7 +130,7 @@ def test_a_motion_in_a_rotated_scene_is_the_rotated_motion(rng: np.random.Genera
         "rtol": 1e-11, "atol": 1e-13, "output_times": times, "initial": (q, u),
     }  # fmt: skip
     here = compile_scene(scene).simulate(0.3, **options)
-    there = compile_scene(rotated(scene, turn, shift)).simulate(0.3, **options)
+    there = compile_scene(rotate_scene(scene, turn, shift)).simulate(0.3, **options)
     assert here.success, here.message
     assert worst(there.q, here.q) < 1e-9
     assert worst(there.u, here.u) < 1e-8

@@ -182,7 +182,7 @@ def test_blows_do_work_and_balances_are_kept(wall: str) -> None:
         assert run.work[-1] == pytest.approx(-0.36 * 0.2 * 9.81 * 2.0, rel=1e-9)
 
 
-def bladed(when: str) -> mstmm.Model:
+def blade_model(when: str) -> mstmm.Model:
     """A hub that swings down with a blade, and a knob on a pin at the tip of that."""
     hub = {"name": "hub", "mass": 2.0, "inertia": [0.1, 0.1, 0.1], "ends": {"rim": [0.2, 0, 0]}}
     knob = rod("knob", 0.2, 0.3)
@@ -203,7 +203,7 @@ def bladed(when: str) -> mstmm.Model:
 @pytest.mark.parametrize(("end", "height"), [("blade.tip", -0.5), ("knob.tip", -0.6)])
 def test_a_blade_strikes_the_floor(end: str, height: float) -> None:
     """All shapes are struck with it: the mass matrix, and slopes of the height by differences."""
-    one = bladed(f"{end}.y < {height}")
+    one = blade_model(f"{end}.y < {height}")
     run = one.simulate(1.0, rtol=1e-9, certify=True)
     assert run.is_comparable and run.certificate.energy.relative < 1e-8
     hit = int(np.flatnonzero(run.trajectory.event > 0)[0])
@@ -221,7 +221,7 @@ def test_a_blade_strikes_the_floor(end: str, height: float) -> None:
 
 def test_a_shape_alone_is_no_place() -> None:
     with pytest.raises(mstmm.SceneError, match="needs a condition on positions"):
-        bladed("blade.q[0] > 0.01").simulate(0.1)
+        blade_model("blade.q[0] > 0.01").simulate(0.1)
 
 
 def begun(when: str, height: float, speed: float, **more: Any) -> mstmm.Model:

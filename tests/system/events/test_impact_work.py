@@ -24,8 +24,8 @@ def in_a_row(hinges: list[Scene], **more: Any) -> Scene:
     return {"gravity": [0, 0, 0], "body": bodies, "hinge": hinges, **more}
 
 
-def stopped(name: str, body: str) -> Scene:
-    """1 m/s from the middle to a hard stop at 1 m."""
+def hard_stop_slider(name: str, body: str) -> Scene:
+    """A slider that moves at 1 m/s from the middle to a hard stop at 1 m."""
     law = {"limits": {"lower": -1.0, "upper": 1.0, "restitution": 0.5}}
     return slider(name, body, law=law, initial={"u": [1.0]})
 
@@ -43,9 +43,9 @@ def of_the_first_blow(run: mstmm.Result) -> list[float]:
     return [float(x[hit] - x[hit - 1]) for x in (run.energy(), run.work)]
 
 
-DRIVEN = [stopped("rail", "cart"), slider("act", "slug", "cart", drive="0.5*t")]
+DRIVEN = [hard_stop_slider("rail", "cart"), slider("act", "slug", "cart", drive="0.5*t")]
 STRUCK = [slider("rail", "cart", initial={"u": [1.0]}), slider("way", "slug", drive="1 - 0.3*t")]
-COUPLED = [stopped("rail", "cart"), slider("way", "slug", initial={"u": [1.0]})]
+COUPLED = [hard_stop_slider("rail", "cart"), slider("way", "slug", initial={"u": [1.0]})]
 #: A cart that 3 kg go on to lead by 0.5 m/s; one that a driven wall of 0.3 m/s meets with 1.3 m/s;
 #: one that 3 kg lag behind by 0.1 t m/s.
 BLOWS: dict[str, tuple[Scene, float | None]] = {
@@ -93,7 +93,7 @@ def test_a_driven_body_on_a_linkage() -> None:
 @pytest.mark.parametrize("inertia", [0.0, 0.7])
 def test_a_rotor_is_struck_with_its_hinge(inertia: float) -> None:
     """2 kg, and a rotor on their rail, lose 1 - e^2 of all that they have."""
-    hinge = stopped("rail", "cart")
+    hinge = hard_stop_slider("rail", "cart")
     hinge["law"]["inertia"] = inertia
     body = [{"name": "cart", "mass": 2.0}]
     run = run_of({"gravity": [0, 0, 0], "body": body, "hinge": [hinge]}, 1.5)

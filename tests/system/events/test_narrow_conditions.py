@@ -32,20 +32,22 @@ def sliding(when: str, do: str = "stop", u: float = 1.0, g: float = 0.0, **more:
     return mstmm.Scene(gravity=(-g, 0, 0), body=[BALL], hinge=[rail], event=events)
 
 
-def simulated(scene: Any, method: str = "dop853", t_end: float = 10.0, **options: Any) -> Result:
+def simulate_looped(
+    scene: Any, method: str = "dop853", t_end: float = 10.0, **options: Any
+) -> Result:
     return mstmm.compile(scene, engine="looped").simulate(t_end, method, **options)
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_a_stop_that_holds_for_a_moment(method: str) -> None:
-    run = simulated(sliding("exp(-((h.q-5)/0.01)^2) > 0.5"), method, **METHODS[method])
+    run = simulate_looped(sliding("exp(-((h.q-5)/0.01)^2) > 0.5"), method, **METHODS[method])
     assert run.status is Status.STOPPED
     assert run.t[-1] == pytest.approx(5 - 0.01 * HALF, abs=1e-11)
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_the_first_of_many_moments(method: str) -> None:
-    run = simulated(sliding("sin(20*h.q) > 0.999"), method, **METHODS[method])
+    run = simulate_looped(sliding("sin(20*h.q) > 0.999"), method, **METHODS[method])
     assert run.status is Status.STOPPED
     assert run.t[-1] == pytest.approx(math.asin(0.999) / 20, abs=1e-11)
 
@@ -53,13 +55,13 @@ def test_the_first_of_many_moments(method: str) -> None:
 @pytest.mark.parametrize("method", METHODS)
 def test_a_narrow_bounce_lets_nothing_through(method: str) -> None:
     wall = sliding("exp(-((b.x-5)/0.01)^2) > 0.5", "bounce", restitution=1.0)
-    run = simulated(wall, method, **METHODS[method])
+    run = simulate_looped(wall, method, **METHODS[method])
     assert run.success and run.u[-1, 0] == pytest.approx(-1.0, abs=1e-9)
     assert run.q[-1, 0] == pytest.approx(2 * (5 - 0.01 * HALF) - 10, abs=1e-9)
 
 
-def reached(x: float) -> float:
-    """When the throw of the next test is at a height (m)."""
+def time_at_height(x: float) -> float:
+    """Time (s) at which the throw of the next test is at a height (m)."""
     return (20 - math.sqrt(400 - 19.62 * x)) / 9.81
 
 
@@ -70,16 +72,16 @@ def reached(x: float) -> float:
         ("abs(b.vx + 7)^3 < 1e-12", (27 - 1e-4) / 9.81),
         ("exp(-((h.u - 3)/1e-3)^2) > 0.5", (17 - 1e-3 * HALF) / 9.81),
         ("b.vx < 0", 20 / 9.81),
-        ("tanh(1e5*(b.x - 15)) - tanh(1e5*(b.x - 15.001)) > 1", reached(15.0)),
-        ("1/(1 + ((h.q - 20)/1e-5)^2) > 0.5", reached(20 - 1e-5)),
-        ("1/(h.q - 15) > 1e5", reached(15.0)),
-        ("sqrt((b.x - 15)^2 + b.y^2) < 1e-6", reached(15 - 1e-6)),
-        ("min(sin(400*h.q), cos(t)) > 0.9999", reached(math.asin(0.9999) / 400)),
+        ("tanh(1e5*(b.x - 15)) - tanh(1e5*(b.x - 15.001)) > 1", time_at_height(15.0)),
+        ("1/(1 + ((h.q - 20)/1e-5)^2) > 0.5", time_at_height(20 - 1e-5)),
+        ("1/(h.q - 15) > 1e5", time_at_height(15.0)),
+        ("sqrt((b.x - 15)^2 + b.y^2) < 1e-6", time_at_height(15 - 1e-6)),
+        ("min(sin(400*h.q), cos(t)) > 0.9999", time_at_height(math.asin(0.9999) / 400)),
     ],
 )
 def test_conditions_on_a_throw(method: str, when: str, time: float) -> None:
     """x = 20 t - 9.81 t^2 / 2, upwards until t = 2.04 s."""
-    run = simulated(sliding(when, u=20.0, g=9.81), method)
+    run = simulate_looped(sliding(when, u=20.0, g=9.81), method)
     assert run.status is Status.STOPPED
     assert run.t[-1] == pytest.approx(time, abs=1e-9)
 
@@ -101,7 +103,7 @@ def test_a_point_that_turns_often_within_a_step(method: str, when: str, angle: f
            "initial": {"u": [6 * math.pi]}}  # fmt: skip
     scene = mstmm.Scene(gravity=(0, 0, 0), body=[rod], hinge=[pin],
                         event=[{"when": when, "do": "stop"}])  # fmt: skip
-    run = simulated(scene, method)
+    run = simulate_looped(scene, method)
     assert run.status is Status.STOPPED
     assert run.t[-1] == pytest.approx(angle / (6 * math.pi), abs=1e-9)
 
@@ -114,7 +116,7 @@ def test_a_place_in_two_coordinates(method: str) -> None:
         when = f"exp(-((b.x-5)^2+(b.y-{y})^2)/1e-6) > 0.5"
         scene = mstmm.Scene(gravity=(0, 0, 0), body=[BALL], hinge=[hinge],
                             event=[{"when": when, "do": "stop"}])  # fmt: skip
-        run = simulated(scene, method)
+        run = simulate_looped(scene, method)
         assert (run.status is Status.STOPPED) is found and not run.risks
         if found:
             assert run.t[-1] == pytest.approx(5 - 1e-3 * HALF / math.sqrt(1.25), abs=1e-9)
@@ -124,7 +126,7 @@ def test_a_place_in_two_coordinates(method: str) -> None:
 def test_a_release_that_holds_for_a_moment(method: str) -> None:
     """What is driven goes on by itself behind the place where it is let go."""
     hinge = {"drive": "sin(t)", "release": "exp(-((h.q - 0.5)/1e-3)^2) > 0.5", "initial": {}}
-    run = simulated(sliding("", hinge=hinge), method, 4.0)
+    run = simulate_looped(sliding("", hinge=hinge), method, 4.0)
     q = 0.5 - 1e-3 * HALF
     time, speed = math.asin(q), math.sqrt(1 - q * q)
     assert run.success
@@ -135,7 +137,7 @@ def test_a_release_that_holds_for_a_moment(method: str) -> None:
 def test_a_switch_that_holds_for_a_moment(method: str) -> None:
     """A force of 300 N over 2 mm sqrt(log 2): the kinetic energy rises by its work."""
     law = {"law": {"effort": "where(exp(-((q - 5)/1e-3)^2) > 0.5, 300, 0)"}}
-    run = simulated(sliding("", hinge=law), method)
+    run = simulate_looped(sliding("", hinge=law), method)
     assert run.u[-1, 0] == pytest.approx(math.sqrt(1 + 300 * 2e-3 * HALF), rel=1e-7)
 
 
@@ -151,7 +153,7 @@ def test_sessions_and_batches_meet_them() -> None:
 
 @pytest.mark.parametrize("method", ["dop853", "scipy-DOP853"])
 def test_what_changes_too_often_to_be_followed_is_a_doubt(method: str) -> None:
-    run = simulated(sliding("sin(2e5*h.q) + 0.5*sin(4e5*h.q) > 1.4"), method, 2.0)
+    run = simulate_looped(sliding("sin(2e5*h.q) + 0.5*sin(4e5*h.q) > 1.4"), method, 2.0)
     assert run.success and not run.trusted
     assert any(risk.name == "switches" and '"seen"' in risk.element for risk in run.risks)
 
@@ -171,7 +173,7 @@ def test_a_session_says_what_changes_too_often() -> None:
 )  # fmt: skip
 def test_what_nearly_holds_is_none(when: str) -> None:
     for method in ("dop853", "scipy-RK45"):
-        run = simulated(sliding(when), method)
+        run = simulate_looped(sliding(when), method)
         assert run.status is Status.FINISHED and not run.risks
 
 
@@ -195,18 +197,18 @@ def test_bounds_hold_between_two_looks(u: float) -> None:
     def state(t: float) -> Any:
         return np.array([u * t - 2 * t * t, u - 4 * t])
 
-    def watched(t: float) -> Any:
+    def event_values(t: float) -> Any:
         return np.array(system.event_values(t, state(t)))
 
     def look(t: float) -> Any:
-        watched(t)
+        event_values(t)
         return system.read_numbers(t, state(t), np.array([u - 4 * t, -4.0]))
 
     n = len(EXPRESSIONS)
     for start, end in ((0.0, 0.01), (0.1, 0.4), (0.3, 1.1), (0.0, 1.0), (0.74, 0.76)):
         bounds = system.enclose(start, look(start), end, look(end))[:n]
         times = np.linspace(start, end, 41)
-        values = np.array([watched(t)[:n] for t in times])
+        values = np.array([event_values(t)[:n] for t in times])
         slack = 1e-9 * (1 + np.abs(values))
         assert (values >= bounds[:, 0] - slack).all() and (values <= bounds[:, 1] + slack).all()
         slopes = np.diff(values, axis=0) / np.diff(times)[:, None]

@@ -27,7 +27,7 @@ def scene(effort: str, q: float = 0.0, u: float = 1.0, **more: Any) -> mstmm.Sce
     return mstmm.Scene.from_data({"gravity": [0, 0, 0], "body": [MASS], "hinge": [hinge]} | more)
 
 
-def moved(
+def simulate_effort(
     effort: str, t_end: float, q: float = 0.0, u: float = 1.0, **options: Any
 ) -> mstmm.Result:
     return mstmm.compile(scene(effort, q, u), engine="looped").simulate(t_end, **options)
@@ -38,7 +38,7 @@ def moved(
 def test_a_wall_turns_the_mass_back(method: str, width: float) -> None:
     push = 2.0 / width  # stops 1 m/s after a quarter of the wall
     wall = f"where(q > 5, where(q < 5 + {width}, -{push}, 0), 0)"
-    result = moved(wall, 10.0, method=method)
+    result = simulate_effort(wall, 10.0, method=method)
     inside = 2 / push
     assert result.success
     assert result.u[-1, 0] == pytest.approx(-1.0, abs=3e-6)
@@ -56,25 +56,27 @@ def test_a_wall_turns_the_mass_back(method: str, width: float) -> None:
     ],
 )
 def test_a_thin_window_slows_the_mass_down(method: str, window: str) -> None:
-    result = moved(window.format(100.0), 10.0, method=method)
+    result = simulate_effort(window.format(100.0), 10.0, method=method)
     speed = np.sqrt(1 - 2 * 100.0 * 0.002)
     assert result.u[-1, 0] == pytest.approx(speed, abs=1e-6)
 
 
 def test_a_thin_bump_without_jumps_is_met() -> None:
-    result = moved("-1e5*max(0, 0.001 - abs(q - 5))", 10.0)
+    result = simulate_effort("-1e5*max(0, 0.001 - abs(q - 5))", 10.0)
     assert result.u[-1, 0] == pytest.approx(np.sqrt(1 - 2 * 1e5 * 1e-6), abs=1e-7)
 
 
 @pytest.mark.parametrize("step", [0.1, 0.0103])
 def test_fixed_steps_meet_the_wall_too(step: float) -> None:
-    result = moved("where(q > 5, where(q < 5.1, -20, 0), 0)", 10.0, method="rk4", step=step)
+    result = simulate_effort(
+        "where(q > 5, where(q < 5.1, -20, 0), 0)", 10.0, method="rk4", step=step
+    )
     assert result.u[-1, 0] == pytest.approx(-1.0, abs=1e-9)
 
 
 def test_samples_beside_a_switch_are_those_of_their_side() -> None:
     times = np.linspace(0, 6, 601)
-    result = moved("where(q > 5, -1, 0)", 6.0, output_times=times)
+    result = simulate_effort("where(q > 5, -1, 0)", 6.0, output_times=times)
     late = np.maximum(times - 5, 0)
     np.testing.assert_allclose(result.q[:, 0], times - late**2 / 2, atol=1e-9)
     np.testing.assert_allclose(result.u[:, 0], 1 - late, atol=1e-9)
@@ -108,7 +110,9 @@ def test_an_event_at_a_narrow_peak_is_found(method: str, when: str) -> None:
 
 @pytest.mark.parametrize("method", ["dop853", "dopri5"])
 def test_a_motion_that_sticks_ends_with_a_reason(method: str) -> None:
-    result = moved("-10*sign(u) + 3*sin(t)", 10.0, u=0.3, method=method, output_times=[0.0, 10.0])
+    result = simulate_effort(
+        "-10*sign(u) + 3*sin(t)", 10.0, u=0.3, method=method, output_times=[0.0, 10.0]
+    )
     assert result.status is Status.TOO_MANY_STEPS and not result.success
     assert "no end in sight" in result.message
     assert "'sign(u)' (effort of hinge \"h\") chatters" in result.message
@@ -117,14 +121,16 @@ def test_a_motion_that_sticks_ends_with_a_reason(method: str) -> None:
 
 
 def test_a_limit_of_steps_is_the_only_one() -> None:
-    result = moved("-10*sign(u)", 10.0, u=0.3, method=mstmm.methods.Method(max_steps=9000))
+    result = simulate_effort(
+        "-10*sign(u)", 10.0, u=0.3, method=mstmm.methods.Method(max_steps=9000)
+    )
     assert result.status is Status.TOO_MANY_STEPS and "more steps than allowed" in result.message
     assert any("chatters" in text for text in result.warnings)
 
 
 def test_switches_passed_in_turn_are_all_met() -> None:
     """A relay drives the mass to and fro: the period is known."""
-    result = moved("-sign(q)", 16.0, q=0.5, u=0.0)
+    result = simulate_effort("-sign(q)", 16.0, q=0.5, u=0.0)
     assert result.q[-1, 0] == pytest.approx(0.5 - 0.0, abs=1e-7)  # four periods of 4 s
     assert result.statistics is not None and result.statistics.switch_crossings == 8
 
@@ -163,7 +169,9 @@ def test_a_run_is_cut_anywhere_bit_for_bit() -> None:
 
 
 def test_scipys_methods_end_where_a_motion_sticks() -> None:
-    result = moved("-10*sign(u)", 10.0, u=0.3, method="scipy-RK45", output_times=[0.0, 10.0])
+    result = simulate_effort(
+        "-10*sign(u)", 10.0, u=0.3, method="scipy-RK45", output_times=[0.0, 10.0]
+    )
     assert result.status is Status.TOO_MANY_STEPS
     assert "'sign(u)' (effort of hinge \"h\") chatters" in result.message
 
@@ -172,7 +180,7 @@ def test_many_conditions_are_watched_up_to_a_limit(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr("mstmm.runtime.packing.switch_margins.MAX_SWITCHES", 1)
     monkeypatch.setattr("mstmm.runtime.run.scene_system.MAX_SWITCHES", 1)
     monkeypatch.setattr("mstmm.runtime.run.run_notes.MAX_SWITCHES", 1)
-    result = moved("where(q > 1, where(q < 2, 0.1, 0), 0)", 1.0)
+    result = simulate_effort("where(q > 1, where(q < 2, 0.1, 0), 0)", 1.0)
     assert any("more than 1 conditions depend on the motion" in text for text in result.warnings)
 
 
@@ -189,7 +197,7 @@ STICKING = [
 def test_implicit_methods_name_what_a_motion_sticks_to(
     effort: str, method: str, step: float | None
 ) -> None:
-    result = moved(
+    result = simulate_effort(
         effort, 5.0, u=0.3, method=mstmm.methods.Method(method, max_steps=5000), step=step
     )
     assert result.status in (Status.TOO_MANY_STEPS, Status.NOT_CONVERGED), result.message
@@ -199,7 +207,7 @@ def test_implicit_methods_name_what_a_motion_sticks_to(
 
 
 def test_a_switch_far_from_the_end_is_not_blamed() -> None:
-    result = moved(
+    result = simulate_effort(
         "-1e-3*sign(u) - q", 50.0, u=1.0, method=mstmm.methods.Method("kvaerno5", max_steps=20)
     )
     assert result.status is Status.TOO_MANY_STEPS and "sign(u)" not in result.message

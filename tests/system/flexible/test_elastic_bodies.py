@@ -25,7 +25,9 @@ BEAM = {
 }  # fmt: skip
 
 
-def moved(flexible: dict[str, Any], hinge: dict[str, Any], t_end: float, rows: int = 41) -> Any:
+def simulate_bar(
+    flexible: dict[str, Any], hinge: dict[str, Any], t_end: float, rows: int = 41
+) -> Any:
     """The bar on a hinge at its root under gravity along -z."""
     kind = "beam" if "length" in flexible else "elastic"
     holding = {"name": "held", "inboard": "ground", "outboard": "bar.root"} | hinge
@@ -39,7 +41,7 @@ SPIN_UP = {"type": "pin", "axis": [0, 0, 1], "drive": "20*(t - 0.25/(2*pi)*sin(8
 
 def test_spun_up_like_a_beam() -> None:
     """Driven to 20 rad/s in 0.25 s under gravity: deflections in both planes, stiffened by spin."""
-    solid, beam = moved(bar.table(**SOLID), SPIN_UP, 0.4), moved(BEAM, SPIN_UP, 0.4)
+    solid, beam = simulate_bar(bar.table(**SOLID), SPIN_UP, 0.4), simulate_bar(BEAM, SPIN_UP, 0.4)
     drawn = [result.deflection("bar", "tip") if result is beam else _deflection(result)
              for result in (solid, beam)]  # fmt: skip
     for direction in (1, 2):
@@ -61,7 +63,7 @@ def _deflection(result: Any) -> Array:
 def test_energy_of_a_swinging_bar(hinge: dict[str, Any]) -> None:
     """A pendulum of finite elements in its mean frame keeps its energy, in space too."""
     start = {"q": [0.2]} if hinge["type"] == "pin" else {"u": [3.0, 1.0, 2.0]}
-    result = moved(bar.table(**SOLID), hinge | {"initial": start}, 0.4)
+    result = simulate_bar(bar.table(**SOLID), hinge | {"initial": start}, 0.4)
     assert result.model.flexible_bodies["bar"].frame == "mean"
     exchanged = np.abs(
         result.energy_components()["gravity"] - result.energy_components()["gravity"][0]
@@ -74,7 +76,7 @@ def test_frames_give_the_same_motion() -> None:
     """A bar held at its root and shaken: tangent and mean frame, and the end pose of each."""
     shaken = {"type": "prismatic", "axis": [0, 0, 1], "drive": "1e-3*(1 - cos(60*t))"}
     one, other = (
-        moved(bar.table(**SOLID, frame=frame), shaken, 0.2).position("bar.tip")
+        simulate_bar(bar.table(**SOLID, frame=frame), shaken, 0.2).position("bar.tip")
         for frame in ("tangent", "mean")
     )
     moves = np.abs(one - one[0]).max()

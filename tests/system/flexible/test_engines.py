@@ -52,7 +52,7 @@ class Interpreted:
         self.allowed = max(AGREEMENT, 10 * sensitive, solved)
 
 
-def compiled(scene: dict[str, Any], engine: str) -> mstmm.Model:
+def model_on_engine(scene: dict[str, Any], engine: str) -> mstmm.Model:
     model = mstmm.compile(mstmm.Scene(**scene), engine=engine)
     assert model.engine == engine
     return model
@@ -72,7 +72,7 @@ def test_interpreted_equals_looped(draw: int, rng: Generator) -> None:
     """Trees with everything there is: hinges of all types, drives, laws, loads on sections and
     along beams, springs, drag, points of quadrature, ends that are turned."""
     scene, q, u = engine_scenes.drawn(int(rng.integers(2**32)), draw % 2 == 0, 3)
-    model = compiled(scene, "looped")
+    model = model_on_engine(scene, "looped")
     fused = Interpreted(model, q, u)
     assert worst(fused.udot, model.accelerations(q, u, TIME)) < fused.allowed
 
@@ -81,7 +81,7 @@ def test_interpreted_equals_looped(draw: int, rng: Generator) -> None:
 def test_compiled_equals_looped(seed: int, rng: Generator) -> None:
     """One state, and several side by side in lanes."""
     scene, q, u = small(seed)
-    model, looped = compiled(scene, "fused"), compiled(scene, "looped")
+    model, looped = model_on_engine(scene, "fused"), model_on_engine(scene, "looped")
     efforts, allowed = rng.normal(size=model.nu), Interpreted(model, q, u).allowed
     expected = looped.accelerations(q, u, TIME, efforts)
     assert worst(model.accelerations(q, u, TIME, efforts), expected) < allowed
@@ -94,7 +94,7 @@ def test_compiled_equals_looped(seed: int, rng: Generator) -> None:
 def test_runs_agree(seed: int) -> None:
     scene, q, u = small(seed)
     results = [
-        compiled(scene, engine).simulate(0.3, rtol=1e-10, atol=1e-12, initial=(q, u))
+        model_on_engine(scene, engine).simulate(0.3, rtol=1e-10, atol=1e-12, initial=(q, u))
         for engine in ("looped", "fused")
     ]
     assert all(result.success for result in results)
@@ -110,7 +110,7 @@ def test_mass_matrix_and_inverse(draw: int, rng: Generator) -> None:
     scene, q, u = engine_scenes.drawn(int(rng.integers(2**32)), draw % 2 == 0, 3)
     for hinge in scene["hinge"]:
         hinge.pop("drive", None)
-    model = compiled(scene, "looped")
+    model = model_on_engine(scene, "looped")
     matrix = model.mass_matrix(q)
     size = np.sqrt(np.diag(matrix))
     scaled = matrix / np.outer(size, size)
@@ -130,7 +130,7 @@ def test_mass_matrix_and_inverse(draw: int, rng: Generator) -> None:
 @pytest.mark.parametrize("draw", range(3))
 def test_derivatives_are_those_of_the_complex_step(draw: int, rng: Generator) -> None:
     scene, q, u = small(int(rng.integers(2**32)), draw > 0, 2)
-    model = compiled(scene, "looped")
+    model = model_on_engine(scene, "looped")
     fused, draws = Interpreted(model, q, u), rng.normal(size=model.nu)
     found = model.derivatives(q, u, TIME)
     memory = model.looped.start_memory()[None].copy()
@@ -156,7 +156,7 @@ def test_derivatives_by_numbers(rng: Generator) -> None:
     scene, q, u = small(5, planar=False, most=2)
     for body in scene["body"]:
         body["allow_unphysical_inertia"] = True
-    model = compiled(scene, "looped")
+    model = model_on_engine(scene, "looped")
     beams = {beam["name"] for beam in scene["beam"]}
     numbers = model.parameters
     loads = tuple(f"load{k}.force_per_length" for k in range(1, 9))
@@ -190,13 +190,13 @@ def test_derivatives_by_numbers(rng: Generator) -> None:
 
 def test_numbers_of_beams_are_parameters() -> None:
     scene, q, u = small(2)
-    model = compiled(scene, "looped")
+    model = model_on_engine(scene, "looped")
     name = scene["beam"][0]["name"]
     assert f"{name}.modes.y" not in model.parameters
     heavier = model.with_parameters({f"{name}.mass_per_length": 7.0})
     assert heavier.flexible_bodies[name].mass == pytest.approx(7.0 * scene["beam"][0]["length"])
     changed = {**scene, "beam": [{**scene["beam"][0], "mass_per_length": 7.0}, *scene["beam"][1:]]}
-    expected = compiled(changed, "looped").accelerations(q, u, TIME)
+    expected = model_on_engine(changed, "looped").accelerations(q, u, TIME)
     assert np.array_equal(heavier.accelerations(q, u, TIME), expected)
     with pytest.raises(SceneError, match="there is no such number"):
         model.with_parameters({f"{name}.modes.y": 3})
@@ -212,7 +212,7 @@ def test_compiling_is_weighed_by_modes() -> None:
         rod = {"name": "rod", "mass": 1.0, "inertia": [0.1, 0.1, 0.1]}
         pins = [{"name": name, "type": "pin", "inboard": a, "outboard": b, "axis": [0, 0, 1]}
                 for name, a, b in (("one", "ground", "b"), ("two", "b.tip", "rod"))]  # fmt: skip
-        model = compiled(
+        model = model_on_engine(
             {"gravity": [0, 0, 0], "beam": [beam], "body": [rod], "hinge": pins}, "looped"
         )
         fusion = Fusion(model.packed_scene, {}, {})

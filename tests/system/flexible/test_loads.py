@@ -11,14 +11,14 @@ import mstmm
 from mstmm.errors import SceneError
 from mstmm.numerics.rotations import from_quaternion, from_rpy
 from mstmm.scene import Scene
-from tests.support.scenes.minimal import Data, bladed
+from tests.support.scenes.minimal import Data, blade_scene
 
 ETA = (0.1, -0.02, 0.08, 0.01)
 
 
 def bent(**parts: Any) -> Data:
     """A blade on a turned pin, bent in both planes at the start; its tip has axes of its own."""
-    data = bladed(
+    data = blade_scene(
         modes={"y": 2, "z": 2}, frame="tangent", initial={"eta": list(ETA)}, rotary_inertia=1e-3,
         ends={"tip": {"position": 10.0, "orientation": [0.3, 0.2, 1.0]}},
     )  # fmt: skip
@@ -33,7 +33,7 @@ def start(data: Data) -> tuple[Any, Any]:
     return model, model.accelerations(q, u, t=0.0)
 
 
-def turned(rotation: Any, force: list[float]) -> list[float]:
+def rotated_force(rotation: Any, force: list[float]) -> list[float]:
     vector: list[float] = (np.array(rotation) @ force).tolist()
     return vector
 
@@ -45,16 +45,16 @@ def test_a_force_in_body_axes_follows_the_loaded_section() -> None:
     model, with_follower = start(bent(load=[load]))
     seen = model.simulate(t_end=1e-3).orientation("blade.tip")[0]
     section = np.array(from_quaternion(seen)) @ np.array(from_rpy([0.3, 0.2, 1.0])).T
-    fixed = {"on": "blade.tip", "force": turned(section, force)}
+    fixed = {"on": "blade.tip", "force": rotated_force(section, force)}
     assert with_follower == pytest.approx(start(bent(load=[fixed]))[1], rel=1e-9)
-    along = {"on": "blade.tip", "force": turned(from_rpy([0, 0, 0.4]), force)}
+    along = {"on": "blade.tip", "force": rotated_force(from_rpy([0, 0, 0.4]), force)}
     assert with_follower != pytest.approx(start(bent(load=[along]))[1], rel=1e-3)
 
 
 def test_a_load_per_length_in_body_axes_follows_the_floating_frame() -> None:
     load = {"on": "blade", "force_per_length": [0.3, -0.2, 0.1], "axes": "body"}
     _, with_follower = start(bent(load=[load]))
-    fixed = load | {"force_per_length": turned(from_rpy([0, 0, 0.4]), [0.3, -0.2, 0.1])}
+    fixed = load | {"force_per_length": rotated_force(from_rpy([0, 0, 0.4]), [0.3, -0.2, 0.1])}
     for axes in ({"axes": "inertial"}, {}):
         same = {key: value for key, value in fixed.items() if key != "axes"} | axes
         assert with_follower == pytest.approx(start(bent(load=[same]))[1], rel=1e-9)
@@ -86,7 +86,9 @@ def test_events_on_modal_coordinates_and_on_ends() -> None:
 
 
 def test_an_entry_beyond_the_shapes_that_auto_chose_is_refused() -> None:
-    data = bladed(modes="auto") | {"load": [{"on": "blade.tip", "force": ["blade.q[99]", 0, 0]}]}
+    data = blade_scene(modes="auto") | {
+        "load": [{"on": "blade.tip", "force": ["blade.q[99]", 0, 0]}]
+    }
     beyond = r"'blade\.q\[99\]': 'blade' has \d+ entries: [yz]1, [yz]2"
     with pytest.raises(SceneError, match=beyond):
         mstmm.compile(Scene(**data), engine="looped")

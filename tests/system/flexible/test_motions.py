@@ -90,7 +90,7 @@ def test_two_pinned_linear_beams_stop_converging() -> None:
         assert 1.2e-3 < tip_error(two_pinned("chord", n, stiffening=False), "two pinned") < 1.5e-3
 
 
-def welded(basis: str, n: int, **keys: Any) -> Scene:
+def welded_beams(basis: str, n: int, **keys: Any) -> Scene:
     own: dict[str, Any] = {"modes": {"y": n}, "basis": basis} | keys
     return scene(
         beam("upper", 0.6, 50.0, **own),
@@ -104,10 +104,10 @@ def welded(basis: str, n: int, **keys: Any) -> Scene:
 def test_welded_beams() -> None:
     """Static end shapes carry the moment of the weld; clamped-free shapes do not."""
     for n, bound in ((2, 2.5e-4), (3, 2.6e-5), (4, 6e-6)):
-        assert tip_error(welded("static+fixed-interface", n), "welded") < bound
+        assert tip_error(welded_beams("static+fixed-interface", n), "welded") < bound
     for n in (2, 3):
-        assert 4e-3 < tip_error(welded("clamped-free", n), "welded") < 8e-3
-        linear = welded("static+fixed-interface", n, stiffening=False)
+        assert 4e-3 < tip_error(welded_beams("clamped-free", n), "welded") < 8e-3
+        linear = welded_beams("static+fixed-interface", n, stiffening=False)
         assert 2.2e-4 < tip_error(linear, "welded") < 5e-4
 
 
@@ -116,7 +116,7 @@ def test_welded_beams() -> None:
     [
         (pendulum("chord", 1, model="rigid"), "pendulum", 1.16e-2),
         (two_pinned("chord", 1, model="rigid"), "two pinned", 8.3e-3),
-        (welded("clamped-free", 1, model="rigid"), "welded", 1.28e-2),
+        (welded_beams("clamped-free", 1, model="rigid"), "welded", 1.28e-2),
     ],
     ids=("pendulum", "two pinned", "welded"),
 )

@@ -66,7 +66,7 @@ def test_methods_that_allow_it_keep_their_order(method: str, name: str) -> None:
     assert np.log2(errors[0] / errors[1]) / 2 > get(method).order - 0.25, errors
 
 
-def counted(
+def run_with_statistics(
     model: mstmm.Model, method: str, tangent: str = "auto", **how: Any
 ) -> tuple[Any, Statistics]:
     chosen = mstmm.methods.Implicit(method, tangent=tangent)
@@ -82,10 +82,10 @@ def test_iterations_agree_whatever_tangent_they_take(method: str) -> None:
     how: dict[str, Any] = {"rtol": 1e-7, "atol": 1e-9}
     if not get(method).adaptive:
         how = {"step": 2e-3, "rtol": 1e-9, "atol": 1e-11}  # which bounds what iterations leave
-    exact, without = counted(model, method, tangent="exact", **how)
+    exact, without = run_with_statistics(model, method, tangent="exact", **how)
     assert without.approximate_tangents == 0
     for tangent in ("auto", "laws"):
-        found, statistics = counted(model, method, tangent=tangent, **how)
+        found, statistics = run_with_statistics(model, method, tangent=tangent, **how)
         assert statistics.approximate_tangents > 0.9 * statistics.tangents > 0
         # within some tolerances in between the estimates of both runs end their steps
         assert found == pytest.approx(exact, abs=1e-5 if "rtol" in how else 1e-6)
@@ -179,10 +179,10 @@ def test_code_of_the_scene_keeps_the_exact_tangent_unless_asked() -> None:
     """There the exact one is a few lines; by laws alone both engines make the same run."""
     looped, fused = (compile_scene(everything(), engine) for engine in ("looped", "fused"))
     how: dict[str, Any] = {"rtol": 1e-6, "atol": 1e-8}
-    assert counted(fused, "esdirk436", **how)[1].approximate_tangents == 0
+    assert run_with_statistics(fused, "esdirk436", **how)[1].approximate_tangents == 0
     for method in ("rodas4pw", "esdirk436"):
-        found, statistics = counted(fused, method, tangent="laws", **how)
-        expected, other = counted(looped, method, tangent="laws", **how)
+        found, statistics = run_with_statistics(fused, method, tangent="laws", **how)
+        expected, other = run_with_statistics(looped, method, tangent="laws", **how)
         assert statistics.approximate_tangents == other.approximate_tangents > 0
         assert found == pytest.approx(expected, abs=1e-9)
 

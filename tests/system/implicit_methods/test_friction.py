@@ -17,7 +17,7 @@ ADAPTIVE = [method for method in IMPLICIT if get(method).adaptive]
 
 
 @cache
-def pulled(sharpness: float) -> Model:
+def pulled_mass(sharpness: float) -> Model:
     """1 kg on a rail, pulled by a spring whose other end runs away at 0.3 m/s, over 1 N of friction
     that changes its sign within `sharpness` (m/s): it sticks, breaks away at 1/3 s, slides."""
     law = {
@@ -61,7 +61,7 @@ def place(model: Model, t_end: float) -> Any:
 @pytest.mark.parametrize("method", ADAPTIVE)
 @pytest.mark.parametrize("sharpness", [1e-2, 1e-3])
 def test_what_sticks_breaks_away_when_it_should(method: str, sharpness: float) -> None:
-    model = pulled(sharpness)
+    model = pulled_mass(sharpness)
     run = model.simulate(2.0, method, rtol=1e-4, atol=1e-6)
     assert run.success, run.message
     assert run.q[-1] == pytest.approx(place(model, 2.0), abs=1e-3)
@@ -70,20 +70,20 @@ def test_what_sticks_breaks_away_when_it_should(method: str, sharpness: float) -
 @pytest.mark.parametrize("method", IMPLICIT)
 def test_fixed_steps_stick_and_slide(method: str) -> None:
     # The step is 1e3 times as long as a friction of 1 N needs to stop 1 kg at 1e-5 m/s.
-    model = pulled(1e-5)
+    model = pulled_mass(1e-5)
     run = model.simulate(2.0, method, 0.01, output_times=[0.2, 2.0])
     assert run.success, run.message
     assert abs(run.q[0, 0]) < 2e-6  # it creeps at less than 1e-5 m/s
-    assert run.q[-1] == pytest.approx(place(pulled(1e-3), 2.0), abs=1e-3)
+    assert run.q[-1] == pytest.approx(place(pulled_mass(1e-3), 2.0), abs=1e-3)
 
 
 @pytest.mark.parametrize("method", ["esdirk436", "kvaerno5", "genalpha", "hht", "newmark"])
 def test_iterated_methods_see_where_a_sharp_friction_breaks_away(method: str) -> None:
     # Rosenbrock's linearise it where a step begins, and may hold on for too long unnoticed.
-    model = pulled(1e-6)
+    model = pulled_mass(1e-6)
     run = model.simulate(2.0, method, rtol=1e-4, atol=1e-6)
     assert run.success, run.message
-    assert run.q[-1] == pytest.approx(place(pulled(1e-3), 2.0), abs=1e-2)
+    assert run.q[-1] == pytest.approx(place(pulled_mass(1e-3), 2.0), abs=1e-2)
     assert run.statistics is not None
     assert run.statistics.steps < 100
 

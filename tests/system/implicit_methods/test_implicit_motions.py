@@ -22,11 +22,11 @@ STEPS = (0.02, 0.01, 0.005, 0.0025)
 
 
 @cache
-def known(name: str) -> Model:
+def known_model(name: str) -> Model:
     return mstmm.compile(mstmm.Scene(**KNOWN[name].scene), engine="looped")
 
 
-def bushed(k: float, zeta: float = 0.0, stretch: float = 0.0) -> Model:
+def bushed_pendulum(k: float, zeta: float = 0.0, stretch: float = 0.0) -> Model:
     """The double pendulum on bushings, with dampers."""
     scene = motions.double_pendulum(k, stretch)
     for hinge in scene["hinge"]:
@@ -37,7 +37,7 @@ def bushed(k: float, zeta: float = 0.0, stretch: float = 0.0) -> Model:
 def distance(name: str, method: str, step: float | None = None, **more: Any) -> float:
     """How far (m) the end is from where it is known to be."""
     case = KNOWN[name]
-    run = known(name).simulate(case.t_end, method, step, output_times=[case.t_end], **more)
+    run = known_model(name).simulate(case.t_end, method, step, output_times=[case.t_end], **more)
     assert run.success, run.message
     return float(np.linalg.norm(run.position(case.end)[-1] - case.place))
 
@@ -58,7 +58,7 @@ def angle_error(model: Model, method: str, step: float) -> float:
 )  # fmt: skip
 def test_double_pendulum_to_second_order(method: str, largest: float) -> None:
     """The discrete form tends to the motion of the acceleration form as the square of the step."""
-    errors = [angle_error(known("double pendulum"), method, step) for step in STEPS]
+    errors = [angle_error(known_model("double pendulum"), method, step) for step in STEPS]
     assert errors[1] < largest
     assert np.log2(errors[:-1]) - np.log2(errors[1:]) == pytest.approx([2.0] * 3, abs=0.05)
 
@@ -66,7 +66,8 @@ def test_double_pendulum_to_second_order(method: str, largest: float) -> None:
 def test_one_linearisation_a_step_is_as_good_as_many() -> None:
     for step in STEPS:
         once, often = (
-            angle_error(known("double pendulum"), method, step) for method in ("dttmm", "genalpha")
+            angle_error(known_model("double pendulum"), method, step)
+            for method in ("dttmm", "genalpha")
         )
         assert once == pytest.approx(often, rel=0.02)
 
@@ -74,7 +75,7 @@ def test_one_linearisation_a_step_is_as_good_as_many() -> None:
 @pytest.mark.parametrize("method", ["genalpha", "dttmm", "newmark", "hht"])
 def test_double_pendulum_keeps_its_energy_in_hinge_coordinates(method: str) -> None:
     """In absolute coordinates undamped Newmark is lost within 8 s; 20 J are exchanged."""
-    run = known("double pendulum").simulate(20.0, method, 0.01)
+    run = known_model("double pendulum").simulate(20.0, method, 0.01)
     assert run.success, run.message
     energy = np.asarray(run.energy())
     assert np.abs(energy - energy[0]).max() < 0.35
@@ -119,8 +120,8 @@ def test_accelerations_are_carried_where_springs_are_stiff_and_evaluated_elsewhe
     method: str,
 ) -> None:
     """A step of the former takes residuals, one of the latter evaluations."""
-    stiff = known("double pendulum, 1e8").simulate(1.0, method, 0.01, output_times=[1.0])
-    turning = known("rods on balls").simulate(1.0, method, 0.01, output_times=[1.0])
+    stiff = known_model("double pendulum, 1e8").simulate(1.0, method, 0.01, output_times=[1.0])
+    turning = known_model("rods on balls").simulate(1.0, method, 0.01, output_times=[1.0])
     assert stiff.statistics is not None
     assert turning.statistics is not None
     assert stiff.statistics.residuals > 2 * stiff.statistics.evaluations
@@ -141,9 +142,9 @@ def test_ten_rods_on_stiff_bushings_to_the_tolerance(rtol: float, error: float) 
 @pytest.mark.parametrize("k", [1e8, 1e10])
 def test_steps_on_stiff_bushings_err_as_those_on_pins(k: float) -> None:
     """The springs vibrate at up to 3e5 rad/s; one linearisation a step in hinge coordinates."""
-    model = bushed(k)
+    model = bushed_pendulum(k)
     for step in STEPS:
-        pinned = angle_error(known("double pendulum"), "dttmm", step)
+        pinned = angle_error(known_model("double pendulum"), "dttmm", step)
         assert angle_error(model, "dttmm", step) == pytest.approx(pinned, rel=0.02)
 
 
@@ -152,7 +153,9 @@ def test_stiff_bushings_tend_to_pins_as_their_compliance(method: str) -> None:
     place = KNOWN["double pendulum"].place
     parts = []
     for k in (1e4, 1e6, 1e8):
-        run = bushed(k, 1.0).simulate(1.0, method, rtol=1e-9, atol=1e-12, output_times=[1.0])
+        run = bushed_pendulum(k, 1.0).simulate(
+            1.0, method, rtol=1e-9, atol=1e-12, output_times=[1.0]
+        )
         assert run.success, run.message
         parts.append(k * float(np.linalg.norm(run.position("rod1.tip")[-1] - place)))
     assert parts[1] == pytest.approx(parts[2], rel=0.03)
@@ -165,7 +168,7 @@ def test_the_energy_of_a_vibration_that_no_step_resolves_leaves(
     method: str, radius: float | None
 ) -> None:
     """A spring of 1e6 N/m holds 0.5 J, the step is five of its periods; the rods keep theirs."""
-    run = bushed(1e6, stretch=1e-3).simulate(
+    run = bushed_pendulum(1e6, stretch=1e-3).simulate(
         2.0, mstmm.methods.GeneralizedAlpha(method, radius=radius), 0.01
     )
     assert run.success, run.message
@@ -176,7 +179,7 @@ def test_the_energy_of_a_vibration_that_no_step_resolves_leaves(
 @pytest.mark.parametrize("method, radius", [("newmark", None), ("genalpha", 1.0)])
 def test_what_is_not_damped_does_not_grow(method: str, radius: float | None) -> None:
     """As long as Newton's iteration is made to converge: what it leaves is all that drives it."""
-    run = bushed(1e6, stretch=1e-3).simulate(
+    run = bushed_pendulum(1e6, stretch=1e-3).simulate(
         12.0, mstmm.methods.GeneralizedAlpha(method, radius=radius), 0.01
     )
     assert run.success, run.message

@@ -39,7 +39,7 @@ def test_killed_at_every_step_of_its_files(laboratory: Laboratory, begun: bool) 
             existed = True
             assert time_of(laboratory) >= reached
             reached = time_of(laboratory)
-        assert laboratory.finished() == whole, at
+        assert laboratory.finish_run() == whole, at
     assert at > 12 and existed and reached == pytest.approx(0.3)
 
 
@@ -60,7 +60,7 @@ def test_interrupted_at_any_line(laboratory: Laboratory, which: signal.Signals) 
         if RESULT in names:  # whole, or what there was
             part = (laboratory.folder / RESULT).read_bytes()
             assert whole.startswith(part) and (CHECKPOINT in names or part == whole), at
-        assert laboratory.finished() == whole, at
+        assert laboratory.finish_run() == whole, at
         at += STRIDE[which]
     assert any("; the run is saved in a.csv.checkpoint" in text for text in said)
     assert any("interrupted at t = " in text and "--resume" in text for text in said)
@@ -75,7 +75,7 @@ def test_interrupted_again_and_again(laboratory: Laboratory) -> None:
         end = laboratory.command(which=signal.SIGINT, at=at, every=3, points="lines")
         assert end.code == 130 and "interrupted" in end.err
         assert CHECKPOINT in laboratory.names(), at
-        assert laboratory.finished() == whole
+        assert laboratory.finish_run() == whole
 
 
 def test_a_checkpoint_of_another_run_is_refused(laboratory: Laboratory) -> None:

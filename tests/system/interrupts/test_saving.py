@@ -186,10 +186,10 @@ def test_a_run_that_ends_by_itself_hands_an_interrupt_on(
     """A program of many short runs ends by Ctrl-C, which none of them has the time to hear."""
     model, advance = library.compile(pendulum(), engine="looped"), integration_run.advance
 
-    def signalled(*arguments: Any) -> Status | None:
+    def signal_and_advance(*arguments: Any) -> Status | None:
         signal.raise_signal(signal.SIGINT)
         return advance(*arguments)
 
-    monkeypatch.setattr(run_execution, "advance", signalled)
+    monkeypatch.setattr(run_execution, "advance", signal_and_advance)
     with pytest.raises(KeyboardInterrupt):
         model.simulate(1e-3)

@@ -140,11 +140,13 @@ def test_slopes_of_accelerations() -> None:
     )
     memory = model.looped.start_memory()
 
-    def closed(x: Array) -> Array:
+    def assembled_coordinates(x: Array) -> Array:
         return model.assemble(q + model.looped.rates(0.0, q, ways @ x, memory))[0]
 
     for k, unit in enumerate(np.eye(len(linear)) * size):
-        moved = [model.accelerations(closed(s * unit), 0 * ways[:, 0]) for s in (1, -1)]
+        moved = [
+            model.accelerations(assembled_coordinates(s * unit), 0 * ways[:, 0]) for s in (1, -1)
+        ]
         going = [model.accelerations(q, s * ways @ unit) for s in (1, -1)]
         for (ahead, behind), matrix in ((moved, linear.K), (going, linear.C)):
             found = (ahead - behind)[places] / (2 * size)

@@ -10,7 +10,7 @@ from tests.support.scenes.gears import (
     RING,
     SUN,
     Scene,
-    coupled,
+    coupled_model,
     inertia,
     pair,
     pin,
@@ -76,7 +76,7 @@ def test_a_screw_at_rest() -> None:
         {"name": "lift", "type": "prismatic", "inboard": "ground", "outboard": "weight",
          "axis": [0, 0, 1]},
     ]  # fmt: skip
-    model = coupled(
+    model = coupled_model(
         [wheel("nut", 1e-3), wheel("weight", 1e-3, mass)], hinges,
         {"expression": f"lift.q - {rise}*turn.q"}, gravity=[0, 0, -9.81],
     )  # fmt: skip
@@ -90,7 +90,7 @@ def test_a_differential_at_rest() -> None:
         pin("case", "a", law={"effort": 2.0}), pin("left", "b", law={"stiffness": 4.0}),
         pin("right", "c", law={"stiffness": 10.0}),
     ]  # fmt: skip
-    model = coupled(
+    model = coupled_model(
         [wheel("a", 0.1), wheel("b", 0.02), wheel("c", 0.03)], hinges,
         {"expression": "left.q + right.q - 2*case.q"},
     )  # fmt: skip
@@ -104,7 +104,7 @@ def _cam() -> mstmm.Model:
         {"name": "lift", "type": "prismatic", "inboard": "ground", "outboard": "weight",
          "axis": [0, 0, 1]},
     ]  # fmt: skip
-    return coupled(
+    return coupled_model(
         [wheel("a", 0.1), wheel("weight", 1e-3, 1.5)], hinges,
         {"expression": "lift.q - 0.3*sin(cam.q)", "equals": 0}, gravity=[0, 0, -9.81],
     )  # fmt: skip
@@ -146,7 +146,7 @@ def test_a_mimic_gripper() -> None:
             {"name": name, "type": "pin", "inboard": f"{inboard}.tip", "outboard": outboard}
             for name, inboard, outboard in (("bend", "near", "tip"), ("bow", "thumb", "nail"))
         ]
-        return coupled(bodies, hinges, *rows)
+        return coupled_model(bodies, hinges, *rows)
 
     model = hand(
         {"expression": "bend.q - 0.8*knuckle.q"}, {"expression": "root.q + knuckle.q"},
@@ -214,7 +214,7 @@ def test_a_rack_that_bounces_throws_its_pinion_back(method: str) -> None:
     """Whatever the inertia of the pinion, e of the speed comes back to both."""
     rack = {"name": "R", "type": "prismatic", "inboard": "ground", "outboard": "rack",
             "axis": [0, 1, 0], "initial": {"q": 0.5}}  # fmt: skip
-    model = coupled(
+    model = coupled_model(
         [wheel("pinion", 0.05), wheel("rack", 1.0, 4.0)], [pin("P", "pinion"), rack],
         {"expression": "0.2*P.q - R.q"}, gravity=[0, -9.81, 0],
         event=[{"name": "stop", "when": "R.q < 0", "do": "bounce", "restitution": 0.6}],

@@ -15,7 +15,7 @@ from tests.reference.compare import worst
 from tests.reference.random_couplings import random_coupled
 from tests.reference.tree import read
 from tests.support import planar_four_bar as planar
-from tests.support.scenes.gears import Scene, coupled, pin, wheel
+from tests.support.scenes.gears import Scene, coupled_model, pin, wheel
 from tests.support.scenes.linkages import four_bar, rod
 
 
@@ -63,7 +63,9 @@ def _arms(*rows: Scene) -> mstmm.Model:
         pin("shoulder", "upper", initial={"q": 0.4, "u": 1.0}),
         {"name": "elbow", "type": "pin", "inboard": "upper.tip", "outboard": "lower"},
     ]
-    return coupled([rod("upper", 0.7), rod("lower", 0.5)], hinges, *rows, gravity=[0, -9.81, 0])
+    return coupled_model(
+        [rod("upper", 0.7), rod("lower", 0.5)], hinges, *rows, gravity=[0, -9.81, 0]
+    )
 
 
 def test_a_mimic_joint_that_time_shifts() -> None:
@@ -102,7 +104,7 @@ def test_a_sleigh() -> None:
             "inertia": [0.3, 0.3, moment]}  # fmt: skip
     hinge = {"name": "P", "type": "planar", "inboard": "ground", "outboard": "sleigh",
              "initial": {"u": [1.0, 0.0, 1.5]}}  # fmt: skip
-    model = coupled([body], [hinge], {"speeds": "cos(P.q[2])*P.u[1] - sin(P.q[2])*P.u[0]"})
+    model = coupled_model([body], [hinge], {"speeds": "cos(P.q[2])*P.u[1] - sin(P.q[2])*P.u[0]"})
     assert model.loops.mobility == 2 and model.loops.constraint_rows == (("coupling1", "speeds"),)
     result = model.simulate(3.0, "dop853", rtol=1e-11, output_times=[0.0, 1.5, 3.0])
     assert result.success, result.message
@@ -136,7 +138,7 @@ def test_batches_and_sessions() -> None:
 def test_a_batch_by_numbers_and_starts_of_its_own(engine: str) -> None:
     """Scenes that nothing but a coupling closes: every trajectory is that of a run alone."""
     bodies = [wheel("a", 0.1) | {"center_of_mass": [0.1, 0, 0]}, wheel("b", 0.2)]
-    scene = coupled(
+    scene = coupled_model(
         bodies, [pin("A", "a", initial={"q": 0.3}), pin("B", "b", initial={"q": 0.5})],
         {"expression": "A.q - k*B.q", "equals": "-0.7"}, constants={"k": 2.0},
     ).scene  # fmt: skip

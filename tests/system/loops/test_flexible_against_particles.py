@@ -16,7 +16,7 @@ from tests.reference.tree import SIZES
 Scene = dict[str, Any]
 
 
-def closed(scene: Scene, seed: int) -> tuple[Scene, Array, Array, tuple[str, str]]:
+def closed_scene(scene: Scene, seed: int) -> tuple[Scene, Array, Array, tuple[str, str]]:
     """The scene with a ball that closes it where its ends are now, the state at which it is closed,
     and the two ends that meet.
 
@@ -38,13 +38,13 @@ def closed(scene: Scene, seed: int) -> tuple[Scene, Array, Array, tuple[str, str
         wrist["position"] = dense.end_motion(this, outer, q, u)[0].tolist()
     wrist["outboard"] = outer
 
-    def apart(speeds: Array) -> Array:
+    def relative_velocity(speeds: Array) -> Array:
         moving = [end for end in (outer, inner) if end != "ground"]
         ends = [dense.end_motion(this, end, q, speeds)[1] for end in moving]
         return np.asarray(ends[0] - sum(ends[1:]))
 
-    columns = np.array([apart(one) for one in np.eye(len(u))]).T
-    u = u - np.linalg.pinv(columns, rcond=1e-10) @ apart(u)
+    columns = np.array([relative_velocity(one) for one in np.eye(len(u))]).T
+    u = u - np.linalg.pinv(columns, rcond=1e-10) @ relative_velocity(u)
     _start(scene, q, u)
     return scene | {"hinge": [*scene["hinge"], wrist]}, q, u, (outer, inner)
 
@@ -73,7 +73,7 @@ def test_chains_of_flexible_bodies(seed: int) -> None:
     """
     print(f"random_beams seed = {seed}")
     tree = random_beams.random_system(seed, most=3, chain=True)
-    scene, q, u, meeting = closed(tree, seed)
+    scene, q, u, meeting = closed_scene(tree, seed)
     model = mstmm.compile(mstmm.Scene(**scene), engine="looped")
     slots = model.coordinate_layout.hinges["wrist"]
     whole_q, whole_u = np.insert(q, [slots.q] * 4, 0.0), np.insert(u, [slots.u] * 3, 0.0)

@@ -44,7 +44,7 @@ def slider_crank(cut: str = "wrist", stiffness: float = 300.0) -> Scene:
                       **BASIS}]}  # fmt: skip
 
 
-def shackled() -> Scene:
+def shackled_beam() -> Scene:
     """A cantilever with two links between its middle and its tip: the loop closes on the beam."""
     links = [rod("near", 0.4, 0.2), rod("far", 0.5, 0.3)]
     hinges: list[Scene] = [
@@ -86,7 +86,7 @@ def hung() -> Scene:
     return {"gravity": [0, 0, -9.81], "body": [bar], "beam": beams, "hinge": hinges}
 
 
-def meshed() -> Scene:
+def meshed_slider_crank() -> Scene:
     """The slider-crank with a rod of rubber from finite elements."""
     scene = slider_crank("wrist")
     del scene["beam"]
@@ -97,8 +97,8 @@ def meshed() -> Scene:
     return scene | {"elastic": [bar]}
 
 
-SCENES = {"meshed": (meshed, "slider", 3), "slider_crank": (slider_crank, "slider", 2),
-          "shackled": (shackled, "far.tip", 2), "hung": (hung, "bar.tip", 3)}  # fmt: skip
+SCENES = {"meshed": (meshed_slider_crank, "slider", 3), "slider_crank": (slider_crank, "slider", 2),
+          "shackled": (shackled_beam, "far.tip", 2), "hung": (hung, "bar.tip", 3)}  # fmt: skip
 
 
 def run(scene: Scene, t_end: float = 0.3, **options: Any) -> mstmm.Result:
@@ -109,7 +109,7 @@ def run(scene: Scene, t_end: float = 0.3, **options: Any) -> mstmm.Result:
     return result
 
 
-def opened(scene: Scene, rows: int, ends: tuple[str, str]) -> mstmm.Model:
+def opened_tree(scene: Scene, rows: int, ends: tuple[str, str]) -> mstmm.Model:
     """The tree without the wrist, and in its place equal forces on both ends by inputs."""
     tree = copy.deepcopy(scene)
     tree["hinge"] = [one for one in tree["hinge"] if one["name"] != "wrist"]
@@ -136,17 +136,17 @@ def test_accelerations_are_those_of_the_tree_under_the_forces_that_close_it(name
     q, u = (np.delete(x[-1], part) for x, part in
             ((closed.q, slots.q_slice), (closed.u, slots.u_slice)))  # fmt: skip
     assert np.abs(q[-2:]).max() > 1e-6  # bent
-    tree = opened(scene, rows, (bent, other))
+    tree = opened_tree(scene, rows, (bent, other))
 
-    def pulled(forces: Array) -> tuple[Array, Array]:
+    def pulled_accelerations(forces: Array) -> tuple[Array, Array]:
         """Accelerations along the speeds, and those of the ends apart from each other."""
         model = tree.with_inputs({f"pull{k}": float(x) for k, x in enumerate(forces)})
         seen = model.simulate(1e-9, initial=(q, u), output_times=[0.0])
         apart = seen.acceleration(bent) - seen.acceleration(other)
         return seen.udot[0], apart[0, :rows]
 
-    free, gap = pulled(np.zeros(rows))
-    columns = [pulled(unit) for unit in np.eye(rows)]
+    free, gap = pulled_accelerations(np.zeros(rows))
+    columns = [pulled_accelerations(unit) for unit in np.eye(rows)]
     forces = np.linalg.solve(np.array([one - gap for _, one in columns]).T, -gap)
     known = free + sum(x * (one - free) for x, (one, _) in zip(forces, columns, strict=True))
     model = mstmm.compile(mstmm.Scene(**scene))

@@ -18,7 +18,7 @@ POINT, NORMAL, RADIUS = np.array([0.8, -1.0, 0.0]), np.array([1.0, 0.2, 0.0]), 1
 ON_GROUND = {"type": "distance", "length": 0.9, "position": POINT.tolist()}
 
 
-def bladed(ring: float = 0.7, **closing: Any) -> mstmm.Model:
+def blade_model(ring: float = 0.7, **closing: Any) -> mstmm.Model:
     """A hub on a pin, a blade on it, and a knob on a pin at the tip of the blade."""
     hub = {"name": "hub", "mass": 2.0, "inertia": [0.1, 0.1, 0.1], "ends": {"rim": [0.2, 0, 0]}}
     knob = {"name": "knob", "mass": 0.3, "inertia": [0.01, 0.01, 0.01],
@@ -39,10 +39,10 @@ def bladed(ring: float = 0.7, **closing: Any) -> mstmm.Model:
 
 @cache
 def free() -> mstmm.Model:
-    return bladed()
+    return blade_model()
 
 
-def at(end: str, q: Array) -> Array:
+def end_position(end: str, q: Array) -> Array:
     """Place of an end of the free blade, m."""
     still = np.zeros(free().nu)
     run = free().simulate(1e-9, initial=(q, still), output_times=[0.0])
@@ -52,25 +52,25 @@ def at(end: str, q: Array) -> Array:
 ROWS: dict[str, tuple[dict[str, Any], float, Any]] = {
     "tip to ground": (
         {"constraint": [{"from": "ground", "to": "blade.tip", **ON_GROUND}]}, 0.7,
-        lambda q: np.linalg.norm(at("blade.tip", q) - POINT),
+        lambda q: np.linalg.norm(end_position("blade.tip", q) - POINT),
     ),
     "ground to tip": (
         {"constraint": [{"from": "blade.tip", "to": "ground", **ON_GROUND}]}, 0.7,
-        lambda q: np.linalg.norm(at("blade.tip", q) - POINT),
+        lambda q: np.linalg.norm(end_position("blade.tip", q) - POINT),
     ),
     "behind the blade": (
         {"constraint": [{"type": "distance", "from": "hub", "to": "knob.top", "length": 1.2}]}, 0.7,
-        lambda q: np.linalg.norm(at("knob.top", q) - at("hub", q)),
+        lambda q: np.linalg.norm(end_position("knob.top", q) - end_position("hub", q)),
     ),
     "plane": (
         {"constraint": [{"type": "point-on-plane", "from": "ground", "to": "blade.tip",
                          "normal": NORMAL.tolist(), "offset": 1.0}]}, 0.7,
-        lambda q: at("blade.tip", q) @ NORMAL,
+        lambda q: end_position("blade.tip", q) @ NORMAL,
     ),
     "curve": (
         {"constraint": [{"type": "point-on-curve", "from": "ground", "to": "knob.top", "start": 0.3,
                          "curve": [f"{RADIUS}*cos(s)", f"{RADIUS}*sin(s)", "0"]}]}, 0.7,
-        lambda q: np.linalg.norm(at("knob.top", q)),
+        lambda q: np.linalg.norm(end_position("knob.top", q)),
     ),
     "gear": (
         {"coupling": [{"expression": "pin.q - 0.5*ring.q"}]}, -2.0,
@@ -84,7 +84,7 @@ def test_what_closes_acts_along_its_row(name: str) -> None:
     """Efforts that a row adds to the free blade are a multiple of its slopes, by differences, and
     it stays as it is, as energy does."""
     closing, ring, row = ROWS[name]
-    one = bladed(ring, **closing)
+    one = blade_model(ring, **closing)
     q, u = one.initial_state()
     places = [one.coordinate_layout.q_names.index(x) for x in free().coordinate_layout.q_names]
     speeds = [one.coordinate_layout.u_names.index(x) for x in free().coordinate_layout.u_names]

@@ -24,7 +24,7 @@ ORDERS = {
 }  # fmt: skip
 
 
-def bushed(stiffness: float) -> dict[str, Any]:
+def bushed_four_bar(stiffness: float) -> dict[str, Any]:
     """A four-bar whose rocker stands on stiff springs and dampers along and across."""
     angle = four_bar()["hinge"][3]["initial"]["q"]
     damping = 0.1 * math.sqrt(stiffness)
@@ -107,7 +107,7 @@ def test_loops_in_space() -> None:
     assert np.abs(result.q[-1] - wanted.q[-1]).max() < 1e-6
 
 
-@pytest.fixture(scope="module", params=[bushed, slider])
+@pytest.fixture(scope="module", params=[bushed_four_bar, slider], ids=["bushed", "slider"])
 def stiff(request: pytest.FixtureRequest) -> mstmm.Model:
     return mstmm.compile(mstmm.Scene(**request.param(1e6)))
 
@@ -152,7 +152,7 @@ def test_choice() -> None:
 
 
 def test_error_asked_for() -> None:
-    model = mstmm.compile(mstmm.Scene(**bushed(1e7)))
+    model = mstmm.compile(mstmm.Scene(**bushed_four_bar(1e7)))
     result = model.simulate(0.3, error=1e-6, output_times=[0.0, 0.3])
     wanted = model.simulate(0.3, "rodas5p", rtol=1e-11, atol=1e-13, output_times=[0.0, 0.3])
     assert np.abs(result.q[-1] - wanted.q[-1]).max() < 1e-6
@@ -160,7 +160,7 @@ def test_error_asked_for() -> None:
 
 def test_fastest_motion() -> None:
     """What `auto` decides by is an eigenvalue of the accelerations' own derivatives."""
-    model = mstmm.compile(mstmm.Scene(**bushed(1e8)))
+    model = mstmm.compile(mstmm.Scene(**bushed_four_bar(1e8)))
     q, u = model.initial_state()
     found = FastestMode(model.looped, model.looped.start_memory()).rate(0.0, q, u)
     step, n = 1e-6, model.nu
@@ -193,7 +193,7 @@ def test_a_drive_that_lets_go_where_the_loop_closes() -> None:
 
 def test_sessions_and_batches() -> None:
     """Ticks of a session are the fixed steps of one run, a batch has what runs alone have."""
-    model = mstmm.compile(mstmm.Scene(**bushed(1e6)))
+    model = mstmm.compile(mstmm.Scene(**bushed_four_bar(1e6)))
     session = model.session(method="genalpha", step=1e-3)
     for _ in range(4):
         session.advance(0.02)

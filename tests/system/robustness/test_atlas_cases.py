@@ -41,11 +41,11 @@ def runs(monkeypatch: pytest.MonkeyPatch) -> list[Result]:
             for one in vars(module).values():
                 getattr(one, "cache_clear", lambda: None)()
 
-    def kept(run: Result) -> Result:
+    def record_run(run: Result) -> Result:
         made.append(run)
         return finished(run)
 
-    monkeypatch.setattr(error_measures, "require_finished", kept)
+    monkeypatch.setattr(error_measures, "require_finished", record_run)
     return made
 
 
@@ -55,8 +55,8 @@ def test_the_failing_side_is_known_and_the_others_are_let_be(name: str, runs: li
     guard, holds, fails = GUARDED[name]
     (case,) = cases.select_cases([name])
 
-    def told(measure: Callable[[float], float], at: float) -> tuple[bool, bool]:
-        """(whether it is a failure, whether the guard tells of one of its runs)."""
+    def failure_and_warning(measure: Callable[[float], float], at: float) -> tuple[bool, bool]:
+        """(whether it is a failure, whether the guard reports one of its runs)."""
         runs.clear()
         try:
             bad = not measure(at) <= case.limit
@@ -64,9 +64,9 @@ def test_the_failing_side_is_known_and_the_others_are_let_be(name: str, runs: li
             bad = True
         return bad, any(guard in {risk.name for risk in run.risks} for run in runs)
 
-    assert told(case.method.measure, holds) == (False, False)
-    assert told(case.method.measure, fails) == (True, True)
-    assert told(case.remedy.measure, fails) == (False, name in STILL_SEEN)
+    assert failure_and_warning(case.method.measure, holds) == (False, False)
+    assert failure_and_warning(case.method.measure, fails) == (True, True)
+    assert failure_and_warning(case.remedy.measure, fails) == (False, name in STILL_SEEN)
 
 
 @pytest.mark.parametrize("distance, told", [(0.1, False), (3e-3, True), (1e-4, True)])

@@ -61,8 +61,8 @@ def scene(hinge: str, name: str) -> mstmm.Scene:
     )  # fmt: skip
 
 
-def said(texts: tuple[str, ...]) -> tuple[str, ...]:
-    """The same sentences of the type that was written anew."""
+def builtin_messages(texts: tuple[str, ...]) -> tuple[str, ...]:
+    """The same messages with the name of the built-in type."""
     return tuple(text.replace("my_", "") for text in texts)
 
 
@@ -71,10 +71,14 @@ def test_nothing_goes_by_the_name(name: str) -> None:
     made = {kind: scene(kind, name) for kind in (name, f"my_{name}")}
     models = [mstmm.compile(one, engine="looped") for one in made.values()]
     ours, theirs = models
-    assert ours.scene.warnings == said(theirs.scene.warnings)
+    assert ours.scene.warnings == builtin_messages(theirs.scene.warnings)
     for body in ours.flexible_bodies:
         one, other = ours.flexible_bodies[body], theirs.flexible_bodies[body]
-        assert (one.frame, one.modes, one.notes) == (other.frame, other.modes, said(other.notes))
+        assert (one.frame, one.modes, one.notes) == (
+            other.frame,
+            other.modes,
+            builtin_messages(other.notes),
+        )
         assert one.K.tobytes() == other.K.tobytes() and one.C.tobytes() == other.C.tobytes()
     links = [[body.link for body in model.packed_scene.system.distinct] for model in models]
     assert links[0] == links[1]
@@ -86,4 +90,4 @@ def test_nothing_goes_by_the_name(name: str) -> None:
     assert runs[0].success and np.isfinite(runs[0].q).all()
     assert runs[0].q.tobytes() == runs[1].q.tobytes()
     assert runs[0].quantity_names() == runs[1].quantity_names()
-    assert runs[0].certificate.warnings == said(runs[1].certificate.warnings)
+    assert runs[0].certificate.warnings == builtin_messages(runs[1].certificate.warnings)

@@ -23,7 +23,7 @@ from scipy.spatial.transform import Rotation
 
 import mstmm
 from tests.support.paths import TESTS
-from tests.support.user_elements.lagrange import integrated
+from tests.support.user_elements.lagrange import lagrange_motion
 
 Array = NDArray[np.float64]
 Make = Callable[[str], None]
@@ -47,19 +47,19 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Any:
 
 
 @pytest.fixture(scope="module")
-def compiled(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], None]:
+def compile_definition(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], None]:
     """Generates a definition into the module's store, once."""
     folder = tmp_path_factory.mktemp("definitions")
 
     @cache
     def make(name: str) -> None:
-        assert generated(name, folder) == "compiled"
+        assert generate_definition(name, folder) == "compiled"
 
     return make
 
 
-def generated(name: str, folder: Path) -> str:
-    """Generate a definition from a copy outside the repository; says how it will run."""
+def generate_definition(name: str, folder: Path) -> str:
+    """Generate a definition from a copy outside the repository; how it will run."""
     path = folder / f"my_{name}.py"
     shutil.copy(DEFINITIONS / f"{name}.py", path)
     begin = time.perf_counter()
@@ -83,7 +83,7 @@ STARTS: dict[str, tuple[dict[str, Any], list[float], list[float]]] = {
 }
 
 
-def started(name: str) -> mstmm.Scene:
+def scene_at_start(name: str) -> mstmm.Scene:
     hinge, q, u = STARTS[name]
     return scene({**hinge, "initial": {"q": q, "u": u}})
 
@@ -107,22 +107,22 @@ def wobble_motion(turn: sp.Symbol, tilt: sp.Symbol) -> tuple[sp.Matrix, sp.Matri
 
 
 @pytest.mark.parametrize("name", STARTS)
-def test_a_model_with_such_a_hinge_can_be_pickled(name: str, compiled: Make) -> None:
-    compiled(name)
-    model = mstmm.compile(started(name))
+def test_a_model_with_such_a_hinge_can_be_pickled(name: str, compile_definition: Make) -> None:
+    compile_definition(name)
+    model = mstmm.compile(scene_at_start(name))
     again, (q, u) = pickle.loads(pickle.dumps(model)), model.initial_state()
     np.testing.assert_array_equal(again.accelerations(q, u), model.accelerations(q, u))
 
 
 @pytest.mark.parametrize(("name", "motion"), [("knee", knee_motion), ("wobble", wobble_motion)])
-def test_hinge_moves_as_lagrange_says(name: str, motion: Any, compiled: Make) -> None:
-    compiled(name)
+def test_hinge_moves_as_lagrange_says(name: str, motion: Any, compile_definition: Make) -> None:
+    compile_definition(name)
     _, q, u = STARTS[name]
     symbols = sp.symbols(f"q:{len(q)}", real=True)
     times = np.linspace(0.0, 1.5, 16)
     rotation, position = motion(*symbols)
-    expected = integrated(rotation, position, symbols, TENSOR, GRAVITY, (q, u), times)
-    model = mstmm.compile(started(name))
+    expected = lagrange_motion(rotation, position, symbols, TENSOR, GRAVITY, (q, u), times)
+    model = mstmm.compile(scene_at_start(name))
     result = model.simulate(1.5, rtol=1e-11, atol=1e-13, output_times=times)
     assert result.success
     assert np.ptp(expected[:, 0]) > 0.2
@@ -131,9 +131,9 @@ def test_hinge_moves_as_lagrange_says(name: str, motion: Any, compiled: Make) ->
     assert np.ptp(energy) < 1e-8 * np.abs(energy).max()
 
 
-def test_own_speeds_move_as_euler_says(compiled: Make) -> None:
+def test_own_speeds_move_as_euler_says(compile_definition: Make) -> None:
     """Angular momentum about the ground's point, with the rotation matrix itself as the state."""
-    compiled("pilot")
+    compile_definition("pilot")
     _, q, u = STARTS["pilot"]
     center, mass = np.array(BODY["center_of_mass"]), BODY["mass"]
     steiner = center @ center * np.eye(3) - np.outer(center, center)
@@ -148,7 +148,7 @@ def test_own_speeds_move_as_euler_says(compiled: Make) -> None:
     turn = Rotation.from_euler("ZYX", q).as_matrix()
     times = np.linspace(0.0, 0.6, 7)
     solved = solve_ivp(rate, (0, 0.6), [*turn.ravel(), *u], "DOP853", times, rtol=1e-12, atol=1e-13)
-    result = mstmm.compile(started("pilot")).simulate(0.6, rtol=1e-11, output_times=times)
+    result = mstmm.compile(scene_at_start("pilot")).simulate(0.6, rtol=1e-11, output_times=times)
     assert result.success
     assert np.abs(result.u - solved.y[9:].T).max() < 1e-8
     found = Rotation.from_euler("ZYX", result.q).as_matrix().reshape(-1, 9)
@@ -157,14 +157,14 @@ def test_own_speeds_move_as_euler_says(compiled: Make) -> None:
 
 @pytest.mark.parametrize("name", ["knee", "wobble", "pilot"])
 def test_hinge_without_a_compiler(
-    name: str, compiled: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    name: str, compile_definition: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    compiled(name)
-    library = mstmm.compile(started(name))
+    compile_definition(name)
+    library = mstmm.compile(scene_at_start(name))
     monkeypatch.setenv("MSTMM_KERNELS", str(tmp_path / "bare"))
     monkeypatch.setenv("CC", "/nonexistent")
-    assert generated(name, tmp_path).startswith("interpreted")
-    interpreted = mstmm.compile(started(name))
+    assert generate_definition(name, tmp_path).startswith("interpreted")
+    interpreted = mstmm.compile(scene_at_start(name))
     rng = np.random.default_rng(5)
     q = rng.uniform(-0.9, 0.9, (40, library.nq))
     u = rng.uniform(-2, 2, (40, library.nu))
@@ -203,9 +203,9 @@ def check_derivatives(model: mstmm.Model, q: Array, u: Array) -> None:
 
 
 @pytest.mark.parametrize("name", ["knee", "wobble", "pilot"])
-def test_derivatives_of_a_hinge_by_its_own_numbers(name: str, compiled: Make) -> None:
-    compiled(name)
-    model = mstmm.compile(started(name))
+def test_derivatives_of_a_hinge_by_its_own_numbers(name: str, compile_definition: Make) -> None:
+    compile_definition(name)
+    model = mstmm.compile(scene_at_start(name))
     q, u = model.initial_state()
     check_derivatives(model, q, u)
     if name == "pilot":  # increments are turns in body axes: dphi' = dw - w x dphi
@@ -216,8 +216,8 @@ def test_derivatives_of_a_hinge_by_its_own_numbers(name: str, compiled: Make) ->
         assert np.abs(found.rate_u - np.eye(3)).max() < 1e-14
 
 
-def test_force_element_presses_as_newton_says(compiled: Make) -> None:
-    compiled("bushing")
+def test_force_element_presses_as_newton_says(compile_definition: Make) -> None:
+    compile_definition("bushing")
     point = {"name": "ball", "mass": 2.0, "inertia": [0.1, 0.1, 0.1]}
     numbers = {"stiffness": 40.0, "cubic": 300.0, "damping": 0.7}
     anchor = np.array([0.1, 0.0, -0.05])
@@ -263,9 +263,9 @@ def gyroscope(**hinge: Any) -> mstmm.Scene:
     return mstmm.Scene(gravity=[0, 0, -9.81], body=[rotor], hinge=[joint | hinge])
 
 
-def test_flywheel_precesses_as_euler_says(compiled: Make) -> None:
+def test_flywheel_precesses_as_euler_says(compile_definition: Make) -> None:
     """m g l = h Phi exactly, for an axis that is level and a body that does not turn about it."""
-    compiled("flywheel")
+    compile_definition("flywheel")
     precession = 2.0 * 9.81 * 0.15 / (0.025 * 400.0)
     level = Rotation.from_euler("Y", np.pi / 2)  # body z along inertial x
     skew = Rotation.from_euler("ZYX", [1.1, -0.7, 0.4])  # pivot axes to body axes

@@ -39,14 +39,14 @@ MORE_MODES = (
 
 
 @cache
-def derived(name: str) -> Derivation:
+def classical_derivation(name: str) -> Derivation:
     return CLASSICAL[name]()
 
 
 @pytest.mark.parametrize("body", (*BODIES, *MORE_MODES), ids=lambda b: b.element)
 def test_body_satisfies_its_premises(body: BodyStatement, rng: np.random.Generator) -> None:
     generated = body.element in CLASSICAL
-    derivation = derived(body.element) if generated else flexible_body.derivation(body)
+    derivation = classical_derivation(body.element) if generated else flexible_body.derivation(body)
     sample = random_body(rng, body.space.planar, body.kind, body.modes, body.planes)
     error = body_residual(
         Premises(derivation), lower(derivation, "transfer"), sample, rng, body.space
@@ -56,7 +56,7 @@ def test_body_satisfies_its_premises(body: BodyStatement, rng: np.random.Generat
 
 @pytest.mark.parametrize("body", BODIES, ids=lambda b: b.element)
 def test_determinant_is_one_at_any_motion(body: BodyStatement, rng: np.random.Generator) -> None:
-    ir = lower(derived(body.element), "transfer")
+    ir = lower(classical_derivation(body.element), "transfer")
     sample = random_body(rng, body.space.planar, body.kind, body.modes, body.planes)
     with mpmath.workdps(DIGITS):
         whole = matrices(ir, kernel_inputs(sample, ir))["U"]
@@ -73,7 +73,7 @@ def pair_of(name: str, which: str) -> Pairing:
 @pytest.mark.parametrize("which", PAIRINGS)
 @pytest.mark.parametrize("name", HINGES)
 def test_hinge_satisfies_its_premises(name: str, which: str, rng: np.random.Generator) -> None:
-    derivation = derived(f"{name}_{which}")
+    derivation = classical_derivation(f"{name}_{which}")
     ir = lower(derivation, "transfer")
     assert hinge_residual(Premises(derivation), ir, derivation, pair_of(name, which), rng) < LIMIT
 
@@ -95,7 +95,7 @@ TRIED = 2
 @pytest.mark.parametrize("name", BODY_PLACES)
 def test_a_turned_sign_in_a_body_is_noticed(name: str, rng: np.random.Generator) -> None:
     body = next(b for b in BODIES if b.element == name)
-    good = derived(name)
+    good = classical_derivation(name)
     premises = Premises(good)
     sample = random_body(rng, body.space.planar, body.kind, body.modes, body.planes)
     for quantity in BODY_PLACES[name]:
@@ -109,7 +109,7 @@ def test_a_turned_sign_in_a_body_is_noticed(name: str, rng: np.random.Generator)
 def test_a_turned_sign_in_a_hinge_is_noticed(
     name: str, quantity: str, rng: np.random.Generator
 ) -> None:
-    good, pair = derived(f"{name}_beam_beam"), pair_of(name, "beam_beam")
+    good, pair = classical_derivation(f"{name}_beam_beam"), pair_of(name, "beam_beam")
     premises = Premises(good)
     found = mutants(Kernel("transfer", good), quantity)
     for mutant in found[:: max(1, len(found) // TRIED)]:

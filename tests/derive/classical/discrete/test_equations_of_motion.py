@@ -120,17 +120,17 @@ def numeric(
     """Rows with the arrays' numbers: the given ones, then those that are defined from them."""
     values: Numbers = {}
 
-    def put(name: str, shape: tuple[int, int], entries: list[sp.Expr]) -> None:
+    def set_symbol_values(name: str, shape: tuple[int, int], entries: list[sp.Expr]) -> None:
         symbol = sp.MatrixSymbol(name, *shape)
         values.update(zip(symbol.as_explicit(), entries, strict=True))
 
     for name, entries in given.items():
         side = round(len(entries) ** 0.5)
         square = name in ("M_f", "J_0", "M_phi")
-        put(name, (side, side) if square else (len(entries), 1), list(entries))
+        set_symbol_values(name, (side, side) if square else (len(entries), 1), list(entries))
     for equation in definitions:
         value = equation.right.xreplace(values)
-        put(str(equation.left.name), value.shape, list(value))
+        set_symbol_values(str(equation.left.name), value.shape, list(value))
     return sp.Matrix(letters.to_matrix_entries(rows).xreplace(values)).applyfunc(sp.expand)
 
 
@@ -196,10 +196,10 @@ def test_derivatives_of_the_rows_are_theirs() -> None:
         for entry, value in zip(symbol.as_explicit(), values, strict=True)
     }
 
-    def spelled(matrix: sp.Matrix) -> sp.Matrix:
+    def expand_entries(matrix: sp.Matrix) -> sp.Matrix:
         return sp.Matrix(letters.to_matrix_entries(matrix).xreplace(entries))
 
-    rows = spelled(solved.rows)
+    rows = expand_entries(solved.rows)
     for name, columns_, matrix in (
         ("etadd", slice(3, 5), solved.mass), ("etad", slice(3, 5), solved.rates),
         (ETA, slice(0, 2), solved.shape),
@@ -207,5 +207,5 @@ def test_derivatives_of_the_rows_are_theirs() -> None:
         symbols = list(vector(name, 2).as_explicit())
         plain = dict(zip(symbols, sp.symbols("u1 u2"), strict=True))
         direct = rows.xreplace(plain).jacobian(list(plain.values()))
-        stated = spelled(matrix)[:, columns_].xreplace(plain)
+        stated = expand_entries(matrix)[:, columns_].xreplace(plain)
         assert (direct - stated).applyfunc(sp.expand) == sp.zeros(5, 2)

@@ -46,7 +46,7 @@ def test_what_it_says(page: Path) -> None:
 
 @pytest.mark.skipif(browser.PROGRAM is None, reason="Chromium is not installed")
 def test_opened(page: Path) -> None:
-    with browser.opened(page, (1000, 900)) as seen:
+    with browser.open_page(page, (1000, 900)) as seen:
         assert seen.wait("document.querySelectorAll('.curves .trace').length === 4"), seen.console
         inner = "document.querySelector('iframe').contentWindow"
         assert seen.wait(f"{inner}.__viserMutable && {inner}.__viserMutable.canvas && 1")
@@ -66,12 +66,12 @@ STRIP = """(() => {
 
 @pytest.mark.skipif(browser.PROGRAM is None, reason="Chromium is not installed")
 def test_the_strip_looks_as_it_did(page: Path) -> None:
-    with browser.opened(page) as seen:
+    with browser.open_page(page) as seen:
         size = {"width": 1000, "height": 900, "deviceScaleFactor": 1, "mobile": False}
         seen.ask("Emulation.setDeviceMetricsOverride", **size)
         assert seen.wait("document.querySelector('img') && document.querySelector('img').complete")
         seen.value("document.querySelector('img').scrollIntoView({block: 'center'})")
-        assert seen.settled(
+        assert seen.wait_for_picture(
             lambda picture: near(blocks(picture, seen.value(STRIP), (18, 4)), "strip.png")
         )
 

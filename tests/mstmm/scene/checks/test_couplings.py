@@ -12,7 +12,7 @@ from mstmm.scene.checks.loop_closures import resolve_coordinate
 from tests.support.scenes.minimal import arm, beam, body, hinge
 
 
-def coupled(*couplings: dict[str, Any], **hinges: dict[str, Any]) -> dict[str, Any]:
+def coupled_rods(*couplings: dict[str, Any], **hinges: dict[str, Any]) -> dict[str, Any]:
     """Three rods in a row, the last on a ball; `hinges` are changes by the hinge's name."""
     joints = {"shoulder": ("ground", "rod1", "pin"), "elbow": ("rod1.tip", "rod2", "cylindrical"),
               "wrist": ("rod2.tip", "rod3", "ball")}  # fmt: skip
@@ -26,7 +26,7 @@ def coupled(*couplings: dict[str, Any], **hinges: dict[str, Any]) -> dict[str, A
 
 def test_coordinates_go_by_number_or_by_their_own_name() -> None:
     text = "shoulder.angle + 2*elbow.displacement*elbow.q[1] + shoulder.q"
-    scene = Scene(**coupled({"expression": text}))
+    scene = Scene(**coupled_rods({"expression": text}))
     assert [resolve_coordinate(scene, name) for name in scene.coupling[0].names] == [
         (0, "q", 0), (1, "q", 0), (1, "q", 1), (0, "q", 0),
     ]  # fmt: skip
@@ -35,7 +35,7 @@ def test_coordinates_go_by_number_or_by_their_own_name() -> None:
 def test_speeds_may_have_factors_that_depend_on_coordinates() -> None:
     rolling = {"speeds": "cos(shoulder.q)*wrist.u[2] - elbow.u[0]/(2 + elbow.q[0])", "equals": "t"}
     others = ("shoulder.u - 2*elbow.u[1]", "wrist.q[0]*wrist.u[0]")
-    scene = Scene(**coupled(rolling, *({"speeds": row} for row in others)))
+    scene = Scene(**coupled_rods(rolling, *({"speeds": row} for row in others)))
     assert scene.coupling[0].equals is not None
     assert resolve_coordinate(scene, scene.coupling[0].names[1]) == (2, "u", 2)
 
@@ -78,7 +78,7 @@ def test_speeds_may_have_factors_that_depend_on_coordinates() -> None:
 )  # fmt: skip
 def test_refused_with_key_and_way_out(row: dict[str, Any], message: str) -> None:
     with pytest.raises(SceneError) as caught:
-        Scene(**coupled(row))
+        Scene(**coupled_rods(row))
     assert message in str(caught.value)
     assert "coupling" in str(caught.value)
 
@@ -93,14 +93,14 @@ def test_modal_coordinates_are_not_coupled() -> None:
 
 def test_a_coupling_written_twice_is_refused() -> None:
     with pytest.raises(SceneError, match="repeats coupling number 1; leave one out"):
-        Scene(**coupled({"name": "gear", "expression": "shoulder.q-2*elbow.q[1]"},
+        Scene(**coupled_rods({"name": "gear", "expression": "shoulder.q-2*elbow.q[1]"},
                         {"expression": "shoulder.q - 2*elbow.q[1]", "equals": 1}))  # fmt: skip
 
 
 def test_a_drive_and_a_coupling_cannot_both_say_how_a_coordinate_goes() -> None:
     driven = {"shoulder": {"drive": "sin(t)"}}
     with pytest.raises(SceneError, match=r"drives already prescribe shoulder\.q"):
-        Scene(**coupled({"expression": "2*shoulder.q", "equals": "t"}, **driven))
-    Scene(**coupled({"expression": "2*shoulder.q - elbow.q[1]"}, **driven))
+        Scene(**coupled_rods({"expression": "2*shoulder.q", "equals": "t"}, **driven))
+    Scene(**coupled_rods({"expression": "2*shoulder.q - elbow.q[1]"}, **driven))
     let_go = {"shoulder": driven["shoulder"] | {"release": 1.0}}
-    Scene(**coupled({"expression": "2*shoulder.q", "equals": "t"}, **let_go))
+    Scene(**coupled_rods({"expression": "2*shoulder.q", "equals": "t"}, **let_go))

@@ -98,8 +98,8 @@ def wire(**changes: Any) -> Data:
     return arm(constraint=[row | changes])
 
 
-def boomed(*hinges: Data, **changes: Any) -> Data:
-    """A beam that the ground holds at its root and these hinges hold too."""
+def beam_scene(*hinges: Data, **changes: Any) -> Data:
+    """A beam on a hinge to the ground at its root, with further hinges."""
     return {"gravity": [0, 0, 0], "beam": [beam("boom", **changes)],
             "hinge": [hinge("root", outboard="boom.root"), *hinges]}  # fmt: skip
 
@@ -107,7 +107,7 @@ def boomed(*hinges: Data, **changes: Any) -> Data:
 def test_the_frame_of_a_beam_in_a_loop_is_judged_by_the_hinge_of_the_tree() -> None:
     grip = {"type": "fixed", "outboard": "boom.tip"}
     for cut, warned in ((False, True), (True, False)):
-        data = boomed(hinge("grip", cut=not cut, **grip), frame="tangent")
+        data = beam_scene(hinge("grip", cut=not cut, **grip), frame="tangent")
         data["hinge"][0]["cut"] = cut
         kept = [risk for risk in Scene(**data).risks if risk.name == "frame"]
         assert bool(kept) == warned
@@ -115,7 +115,7 @@ def test_the_frame_of_a_beam_in_a_loop_is_judged_by_the_hinge_of_the_tree() -> N
 
 def test_a_beam_may_spin_only_if_all_that_hold_it_let_it() -> None:
     spin = {"axis": [1, 0, 0]}
-    data = boomed(hinge("grip", outboard="boom.tip", type="ball"))
+    data = beam_scene(hinge("grip", outboard="boom.tip", type="ball"))
     data["hinge"][0] |= spin
     with pytest.raises(SceneError, match='hinge "root" allows the beam to spin about its axis'):
         Scene(**data)

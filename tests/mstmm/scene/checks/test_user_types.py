@@ -10,7 +10,7 @@ import pytest
 from mstmm.errors import SceneError
 from mstmm.ir.element_spec import ElementSpec, Param
 from mstmm.scene import Scene, load_scene
-from tests.support.scenes.minimal import arm, body, changed, hinge, one
+from tests.support.scenes.minimal import arm, body, change_value, hinge, one_rod
 
 KNEE = ElementSpec(
     "hinge",
@@ -28,7 +28,7 @@ KNOWN = {(s.kind, s.name): s for s in (KNEE, OWN_SPEEDS, FLYWHEEL, ROPE)}
 
 
 def knee(**changes: Any) -> dict[str, Any]:
-    return one(**({"type": "knee", "parameters": {"radius": 0.1}} | changes))
+    return one_rod(**({"type": "knee", "parameters": {"radius": 0.1}} | changes))
 
 
 def test_a_user_type_is_kept_with_its_numbers() -> None:
@@ -62,18 +62,18 @@ BAD = [
     (knee(law={"damping": 1}), "one number cannot be used for efforts in N*m, N"),
     (knee(law={"effort": ["q[2]", 0]}), 'the last entry of hinge "shoulder" is [1]'),
     (knee(law={"effort": ["q", 0]}), "write q[0] to q[1]"),
-    (one(type="cardan", drive=["t", "t"]), "cardan cannot be driven: it has"),
-    (one(type="pinn"), 'unknown hinge type "pinn"; did you mean "pin"?'),
-    (one(type="kne"), 'unknown hinge type "kne"; did you mean "knee"?'),
-    (one(type="spring"), 'unknown hinge type "spring"'),
-    (one(type="Revolute"), 'unknown hinge type "Revolute"; use "pin"'),
-    (one(type="weld_joint"), 'unknown hinge type "weld_joint"; use "fixed"'),
+    (one_rod(type="cardan", drive=["t", "t"]), "cardan cannot be driven: it has"),
+    (one_rod(type="pinn"), 'unknown hinge type "pinn"; did you mean "pin"?'),
+    (one_rod(type="kne"), 'unknown hinge type "kne"; did you mean "knee"?'),
+    (one_rod(type="spring"), 'unknown hinge type "spring"'),
+    (one_rod(type="Revolute"), 'unknown hinge type "Revolute"; use "pin"'),
+    (one_rod(type="weld_joint"), 'unknown hinge type "weld_joint"; use "fixed"'),
     (
-        changed(one(), "body", 0, "type", to="rigidd"),
+        change_value(one_rod(), "body", 0, "type", to="rigidd"),
         'unknown body type "rigidd"; did you mean "rigid"?',
     ),
     (
-        one() | {"spring": [{"from": "ground", "to": "rod1", "type": "sprong"}]},
+        one_rod() | {"spring": [{"from": "ground", "to": "rod1", "type": "sprong"}]},
         'spring "spring1": type: unknown force type "sprong"; did you mean "spring"?',
     ),
     (
@@ -83,14 +83,14 @@ BAD = [
 ]
 
 
-def coupled(expression: str) -> dict[str, Any]:
+def coupled_knee(expression: str) -> dict[str, Any]:
     return knee() | {"coupling": [{"expression": expression}]}
 
 
 def test_coordinates_of_a_type_that_is_not_known_yet_may_be_coupled() -> None:
-    Scene(**coupled("shoulder.q[0] - 2*shoulder.roll")).check_types(KNOWN)
+    Scene(**coupled_knee("shoulder.q[0] - 2*shoulder.roll")).check_types(KNOWN)
     with pytest.raises(SceneError, match="the last entry of hinge"):
-        Scene(**coupled("shoulder.q[2]")).check_types(KNOWN)
+        Scene(**coupled_knee("shoulder.q[2]")).check_types(KNOWN)
 
 
 @pytest.mark.parametrize(("data", "fragment"), BAD)
@@ -102,7 +102,7 @@ def test_what_does_not_fit_the_definition(data: dict[str, Any], fragment: str) -
     assert str(caught.value).startswith("arm.toml: ")
 
 
-def roped(**changes: Any) -> dict[str, Any]:
+def chain_scene(**changes: Any) -> dict[str, Any]:
     """A chain whose second body and hinge are of users' types."""
     own = {"type": "knee", "parameters": {"radius": 0.1}} | changes
     flywheel = {"type": "flywheel", "parameters": {"spin": 5}, "ends": {"tip": [1, 0, 0]}}
@@ -113,22 +113,31 @@ def roped(**changes: Any) -> dict[str, Any]:
 
 
 def test_user_types_in_chains() -> None:
-    Scene(**roped(law={"effort": ["q[1]", "radius"]})).check_types(KNOWN)
+    Scene(**chain_scene(law={"effort": ["q[1]", "radius"]})).check_types(KNOWN)
 
 
 @pytest.mark.parametrize(
     ("data", "fragment"),
     [
-        (roped(parameters={}), 'chain "rope": hinge[1].parameters.radius: missing; expected a num'),
-        (roped(type="kne"), 'chain "rope": hinge[1].type: unknown hinge type "kne"; did you'),
-        (roped(initial={"q": [1]}), "hinge[1].initial.q: expected 2 entries for knee, found 1"),
-        (roped(law={"effort": ["q[2]", 0]}), 'the last entry of hinge "rope[1].hinge" is [1]'),
         (
-            roped() | {"event": [{"when": "rope[3].hinge.u[2] > 1", "do": "stop"}]},
+            chain_scene(parameters={}),
+            'chain "rope": hinge[1].parameters.radius: missing; expected a num',
+        ),
+        (chain_scene(type="kne"), 'chain "rope": hinge[1].type: unknown hinge type "kne"; did you'),
+        (
+            chain_scene(initial={"q": [1]}),
+            "hinge[1].initial.q: expected 2 entries for knee, found 1",
+        ),
+        (
+            chain_scene(law={"effort": ["q[2]", 0]}),
+            'the last entry of hinge "rope[1].hinge" is [1]',
+        ),
+        (
+            chain_scene() | {"event": [{"when": "rope[3].hinge.u[2] > 1", "do": "stop"}]},
             "'rope[3].hinge.u[2]': the last entry of hinge \"rope[3].hinge\" is [1]",
         ),
         (
-            roped(law={"effort": ["rope[5].hinge.q", 0]}),
+            chain_scene(law={"effort": ["rope[5].hinge.q", 0]}),
             "write rope[5].hinge.q[0] to rope[5].hinge.q[1]",
         ),
     ],
@@ -138,7 +147,7 @@ def test_what_does_not_fit_in_a_chain(data: dict[str, Any], fragment: str) -> No
     with pytest.raises(SceneError) as caught:
         scene.check_types(KNOWN, "rope.toml")
     assert fragment in str(caught.value)
-    Scene(**roped()).check_types(KNOWN)
+    Scene(**chain_scene()).check_types(KNOWN)
 
 
 def test_check_against_looks_at_its_own_type_only() -> None:
@@ -154,12 +163,12 @@ def test_keys_that_a_definition_does_not_read_are_refused() -> None:
             Scene(**knee(**{key: value})).check_types(KNOWN)
     with pytest.raises(SceneError, match=r'law: law belongs to type "spring"; use parameters'):
         rope = {"from": "ground", "to": "rod1", "type": "rope", "law": {"stiffness": 1}}
-        Scene(**one(), spring=[rope])
+        Scene(**one_rod(), spring=[rope])
 
 
 def test_loading_checks_types_when_they_are_known(tmp_path: Path) -> None:
     path = tmp_path / "arm.toml"
-    path.write_text(Scene(**one(type="pinn")).to_toml())
+    path.write_text(Scene(**one_rod(type="pinn")).to_toml())
     assert load_scene(path).hinge[0].type == "pinn"
     with pytest.raises(SceneError, match=r'arm\.toml: hinge "shoulder": type: unknown hinge type'):
         load_scene(path, known_types={})

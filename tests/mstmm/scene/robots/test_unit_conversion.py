@@ -53,7 +53,7 @@ IN_MM = """<robot><link name="base"/>
 </robot>"""
 
 
-def told(found: ImportedRobot) -> list[str]:
+def note_texts(found: ImportedRobot) -> list[str]:
     return [f"{note.element}: {note.text}" for note in found.notes]
 
 
@@ -127,7 +127,7 @@ def test_links_with_dust_of_inertia_and_no_mass_have_none(
     found = mstmm.import_robot(written(tmp_path, ARM.replace("</robot>", extra)))
     assert (
         "link 'speck': no mass, and an inertia that is rounding; both are treated as zero"
-        in told(found)
+        in note_texts(found)
     ) == dust
     assert ("j" not in found.joints) == dust
 
@@ -144,7 +144,7 @@ def test_several_trees_stand_side_by_side() -> None:
     assert [hinge.inboard for hinge in found.scene.hinge] == ["ground", "ground"]
     swings = mstmm.compile(found.scene).accelerations([0.0, 0.0], [0.0, 0.0])
     assert swings == pytest.approx([9.81 * out / (1 + out**2) for out in (0.3, 0.6)], rel=1e-14)
-    assert "trees: 2 of them: 'a0', 'b0'; each has its own base" in told(found)
+    assert "trees: 2 of them: 'a0', 'b0'; each has its own base" in note_texts(found)
 
 
 def test_of_two_mimics_of_a_joint_the_last_one_counts() -> None:
@@ -152,7 +152,7 @@ def test_of_two_mimics_of_a_joint_the_last_one_counts() -> None:
         Mimic("j2", "j0", 2.0, 0.0), Mimic("j2", "j1", 3.0, 0.0), Mimic("j2", "none", 1.0, 0.0)
     )  # fmt: skip
     found = scene_from_robot(chain(pin(0), pin(1), pin(2), mimics=mimics), ImportOptions())
-    assert "joint 'j2': several <mimic>: the last one applies, not 'j0'" in told(found)
+    assert "joint 'j2': several <mimic>: the last one applies, not 'j0'" in note_texts(found)
     (coupling,) = found.scene.coupling
     assert [name.text for name in coupling.names] == ["j2.q", "j1.q"]
 
@@ -162,4 +162,4 @@ def test_a_mimic_of_several_coordinates_is_told(tmp_path: Path) -> None:
     mimic = joint("planar", "a", "c", '<mimic joint="k"/>')
     text = robot("a", mimic).replace("</robot>", body + "</inertial></link></robot>")
     found = mstmm.import_robot(written(tmp_path, text))
-    assert "joint 'j': its <mimic> is left out: a planar joint" in told(found)
+    assert "joint 'j': its <mimic> is left out: a planar joint" in note_texts(found)

@@ -16,7 +16,7 @@ from mstmm.scene import Scene, load_scene
 from mstmm.scene.checks import topology
 from mstmm.scene.tables.rigid_equivalent import rigid_body_of_beam
 from mstmm.scene.tables.shape_functions import ShapeFunction, shape_at
-from tests.support.scenes.minimal import Data, bladed, hinge
+from tests.support.scenes.minimal import Data, blade_scene, hinge
 
 WHOLE = """
 gravity = [0, 0, -9.81]
@@ -74,8 +74,8 @@ do = "stop"
 """
 
 
-def warned(**changes: Any) -> tuple[str, ...]:
-    return Scene(**bladed(**changes)).warnings
+def scene_warnings(**changes: Any) -> tuple[str, ...]:
+    return Scene(**blade_scene(**changes)).warnings
 
 
 def test_every_key_reads_and_writes(tmp_path: Path) -> None:
@@ -113,7 +113,7 @@ def test_pieces_take_from_the_beam_what_they_leave_out() -> None:
 
 
 def test_defaults_and_shorthands() -> None:
-    plain = Scene(**bladed(modes=...)).beam[0]
+    plain = Scene(**blade_scene(modes=...)).beam[0]
     assert plain.modes is None and plain.quadrature is None
     assert (plain.frame, plain.basis, plain.model, plain.stiffening) == (
         "auto", "auto", "flexible", True,
@@ -123,15 +123,15 @@ def test_defaults_and_shorthands() -> None:
     start = plain.initial
     assert (start.static, start.eta, start.etad) == (False, None, None)
     assert len(plain.sections) == 1 and plain.sections[0].polar_inertia_per_length is None
-    same = Scene(**bladed(modes="auto", quadrature="auto", initial="undeformed", frame="auto"))
+    same = Scene(**blade_scene(modes="auto", quadrature="auto", initial="undeformed", frame="auto"))
     assert same.beam[0] == plain
-    given = Scene(**bladed(modes=3, damping=0.02, initial="static")).beam[0]
+    given = Scene(**blade_scene(modes=3, damping=0.02, initial="static")).beam[0]
     assert given.modes is not None and given.modes.counts == (3, 3, 0, 0)
     assert given.damping.ratio == (0.02,) and given.initial.static
 
 
 def test_the_name_alone_means_the_root() -> None:
-    data = bladed() | {
+    data = blade_scene() | {
         "hinge": [hinge(outboard="blade", axis=[0, 1, 0]), hinge("next", inboard="blade",
                   outboard="rod")],
         "body": [{"name": "rod", "mass": 1.0, "inertia": [1, 1, 1]}],
@@ -155,7 +155,7 @@ def test_the_skeleton_has_the_same_tree_with_rigid_bodies() -> None:
     rod = {"name": "rod", "mass": 1.0, "inertia": [1, 1, 1]}
     hinges = [hinge(outboard="blade.mid"), hinge("b", inboard="rope[1].end", outboard="rod")]
     parts = {"body": [rod], "chain": [chain], "hinge": hinges}
-    scene = Scene(**bladed(ends={"mid": 5.0}) | parts)
+    scene = Scene(**blade_scene(ends={"mid": 5.0}) | parts)
     assert [b.name for b in scene.bodies] == ["rod", "rope[0]", "rope[1]", "rope[2]"]
     skeleton = scene.skeleton
     names = [b.name for b in skeleton.bodies]
@@ -173,7 +173,7 @@ def test_the_rigid_beam_has_the_mass_and_inertia_of_its_pieces() -> None:
         {"from": 0, "to": 3, "mass_per_length": 2.0, "rotary_inertia": [0.1, 0.3]},
         {"from": 3, "to": 10, "mass_per_length": 0.5, "rotary_inertia": [0.2, 0.1]},
     ]
-    scene = Scene(**bladed(section=pieces, mass_per_length=...))
+    scene = Scene(**blade_scene(section=pieces, mass_per_length=...))
     body = rigid_body_of_beam(scene.beam[0])
     n = 20_000
     slices = [(10 * (k + 0.5) / n, 10 / n) for k in range(n)]
@@ -210,7 +210,9 @@ def test_shapes_and_their_exact_derivatives() -> None:
 
 def test_shapes_say_how_many_modes_there_are() -> None:
     shapes = {"z": ["(x/L)^2", "(x/L)^3"], "y": ["1 - cos(pi*x/(2*L))"], "twist": ["x/L"]}
-    data = bladed(shapes=shapes, modes=..., torsional_stiffness=10.0, polar_inertia_per_length=1e-3)
+    data = blade_scene(
+        shapes=shapes, modes=..., torsional_stiffness=10.0, polar_inertia_per_length=1e-3
+    )
     scene = Scene(**data)
     blade = scene.beam[0]
     assert blade.basis == "given" and blade.modes is not None
@@ -224,7 +226,7 @@ def test_shapes_say_how_many_modes_there_are() -> None:
      "1e9*(x/L)^2", "(x/L)^2 + 1e-3*(x/L)^30"],
 )  # fmt: skip
 def test_smooth_shapes_are_accepted_whatever_their_waves_and_units(shape: str) -> None:
-    assert Scene(**bladed(shapes={"y": [shape]}, modes=...)).beam[0].shapes is not None
+    assert Scene(**blade_scene(shapes={"y": [shape]}, modes=...)).beam[0].shapes is not None
 
 
 @pytest.mark.parametrize(
@@ -243,7 +245,7 @@ def test_how_many_shapes_there_are_is_known_unless_a_frame_may_double_them(
     changes: Data, known: bool
 ) -> None:
     """Clamped-free shapes stand on either side of an inner section: 2 n of them."""
-    data = bladed(**changes, initial={"eta": [0.1] * 6})
+    data = blade_scene(**changes, initial={"eta": [0.1] * 6})
     blade = Scene(**data).beam[0]
     assert (blade.mode_names is not None) is known
     data["beam"][0]["initial"] = {"eta": [0.1] * 12}
@@ -258,7 +260,7 @@ def test_how_many_shapes_there_are_is_known_unless_a_frame_may_double_them(
 
 
 def test_no_warning_for_a_slender_beam_left_to_the_defaults() -> None:
-    assert warned(rotary_inertia=1e-4) == ()
+    assert scene_warnings(rotary_inertia=1e-4) == ()
 
 
 @pytest.mark.parametrize(
@@ -274,14 +276,14 @@ def test_no_warning_for_a_slender_beam_left_to_the_defaults() -> None:
     ],
 )
 def test_accepted_with_a_warning(changes: Data, fragment: str) -> None:
-    found = warned(**changes)
+    found = scene_warnings(**changes)
     assert len(found) == 1 and fragment in found[0]
 
 
 def test_height_counts_only_where_the_beam_bends() -> None:
     thick_along_z = {"rotary_inertia": [1.2 * 1.3**2 / 12, 1e-4]}
-    assert warned(modes={"z": 2}, **thick_along_z)
-    assert not warned(modes={"y": 2}, **thick_along_z)
+    assert scene_warnings(modes={"z": 2}, **thick_along_z)
+    assert not scene_warnings(modes={"y": 2}, **thick_along_z)
 
 
 PINNED: Data = {"type": "pin", "axis": [0, 0, 1]}
@@ -308,7 +310,7 @@ PINNED: Data = {"type": "pin", "axis": [0, 0, 1]}
 def test_tangent_frames_where_the_hinge_leaves_the_section_free(
     kind: Data, changes: Data, count: int
 ) -> None:
-    data = bladed(**changes)
+    data = blade_scene(**changes)
     data["hinge"] = [{"name": "hub", "inboard": "ground", "outboard": "blade"} | kind]
     found = Scene(**data).warnings
     assert len(found) == count
@@ -329,7 +331,7 @@ def test_tangent_frames_where_the_hinge_leaves_the_section_free(
 def test_a_basis_that_cannot_carry_the_moment_at_the_tip(
     basis: str, kind: Data, count: int
 ) -> None:
-    data = bladed(basis=basis, modes={"y": 2})
+    data = blade_scene(basis=basis, modes={"y": 2})
     data["body"] = [{"name": "load", "mass": 1.0, "inertia": [1, 1, 1]}]
     data["hinge"].append({"name": "grip", "inboard": "blade.tip", "outboard": "load"} | kind)
     found = Scene(**data).warnings

@@ -21,7 +21,7 @@ def chain(name: str = "rope", **changes: Any) -> Data:
     return {"name": name, "count": 5, "inboard": "ground", "body": LINK, "hinge": PIN} | changes
 
 
-def roped(**changes: Any) -> Data:
+def rope(**changes: Any) -> Data:
     return {"gravity": [0, 0, -9.81], "chain": [chain(**changes)]}
 
 
@@ -55,13 +55,13 @@ def test_members_are_bodies_and_hinges_with_names() -> None:
 
 
 def test_a_table_alone_and_a_list_of_one_are_the_same() -> None:
-    assert Scene(**roped(body=[LINK], hinge=[PIN])) == Scene(**roped())
+    assert Scene(**rope(body=[LINK], hinge=[PIN])) == Scene(**rope())
 
 
 def test_round_trip_and_schema() -> None:
     import tomllib
 
-    scene = Scene(**roped(hinge=[PIN, {"type": "planar", "normal": [0, 1, 0]}], position=[0, 1, 2]))
+    scene = Scene(**rope(hinge=[PIN, {"type": "planar", "normal": [0, 1, 0]}], position=[0, 1, 2]))
     assert Scene(**tomllib.loads(scene.to_toml())) == scene
     assert Scene(**json.loads(scene.model_dump_json(by_alias=True))) == scene
     schema = Scene.model_json_schema(by_alias=True)["$defs"]
@@ -70,8 +70,8 @@ def test_round_trip_and_schema() -> None:
 
 
 def test_only_the_only_end_needs_no_name() -> None:
-    assert Scene(**roped(count=1, body={"mass": 1.0})).chain[0].held_ends == ("",)
-    assert Scene(**roped(body=TWO_ENDS, end="side")).hinges[3].inboard == "rope[2].side"
+    assert Scene(**rope(count=1, body={"mass": 1.0})).chain[0].held_ends == ("",)
+    assert Scene(**rope(body=TWO_ENDS, end="side")).hinges[3].inboard == "rope[2].side"
 
 
 def test_a_chain_is_one_run_whatever_its_length() -> None:
@@ -93,7 +93,7 @@ def test_a_chain_is_one_run_whatever_its_length() -> None:
         assert tree.scene_indices(place) == (link.body, link.hinge)
         assert tree.position_of_body(link.body) == tree.position[link.body] == place
         assert tree.position_of_hinge(link.hinge) == place
-    assert not is_chain(tree) and is_chain(topology.build_topology(Scene(**roped())))
+    assert not is_chain(tree) and is_chain(topology.build_topology(Scene(**rope())))
 
 
 def test_subtrees_are_contiguous() -> None:
@@ -110,48 +110,48 @@ def test_subtrees_are_contiguous() -> None:
 
 
 BAD: list[tuple[Data, str]] = [
-    (roped(count=0), 'chain "rope": count: expected a whole number from 1 to 10000000, found 0'),
-    (roped(count=2.5), "count: expected a whole number from 1 to 10000000, found 2.5"),
-    (roped(count=True), "count: expected a whole number from 1 to 10000000, found true"),
-    (roped(count="5"), "count: expected a whole number from 1 to 10000000, found '5'"),
-    (roped(body=...), "body: missing; expected a body table, or a list of body tables"),
-    (roped(body=[]), "body: expected a body table or a list of them, found an empty list"),
-    (roped(hinge=3), "hinge: expected a hinge table, or a list of hinge tables that is repeated"),
-    (roped(body=LINK | {"mass": -1}), 'chain "rope": body[0].mass: expected a number in kg, 0 or'),
-    (roped(body=[LINK, LINK | {"inertia": [1, 1, 9]}]), 'chain "rope": body[1].inertia: the princ'),
-    (roped(body=LINK | {"name": "x"}), 'body[0].name: members of a chain are named'),
-    (roped(hinge=PIN | {"inboard": "ground"}), "hinge[0].inboard: each member is connected to"),
-    (roped(hinge=PIN | {"release": 1.0}), "hinge[0].release: members of a chain cannot be rel"),
-    (roped(hinge=PIN | {"initial": {"q": [1, 2]}}), "hinge[0].initial.q: expected 1 entry for a p"),
-    (roped(body=LINK | {"massa": 1}), 'body[0].massa: unknown key; did you mean "mass"?'),
-    (roped(hinges=[PIN]), 'hinges: unknown key; did you mean "hinge"?'),
-    (roped(count=1, hinge=[PIN, PIN]), "hinge: 2 tables for a chain of 1; leave some out or raise"),
-    (roped(body=LINK | {"ends": {}}),
+    (rope(count=0), 'chain "rope": count: expected a whole number from 1 to 10000000, found 0'),
+    (rope(count=2.5), "count: expected a whole number from 1 to 10000000, found 2.5"),
+    (rope(count=True), "count: expected a whole number from 1 to 10000000, found true"),
+    (rope(count="5"), "count: expected a whole number from 1 to 10000000, found '5'"),
+    (rope(body=...), "body: missing; expected a body table, or a list of body tables"),
+    (rope(body=[]), "body: expected a body table or a list of them, found an empty list"),
+    (rope(hinge=3), "hinge: expected a hinge table, or a list of hinge tables that is repeated"),
+    (rope(body=LINK | {"mass": -1}), 'chain "rope": body[0].mass: expected a number in kg, 0 or'),
+    (rope(body=[LINK, LINK | {"inertia": [1, 1, 9]}]), 'chain "rope": body[1].inertia: the princ'),
+    (rope(body=LINK | {"name": "x"}), 'body[0].name: members of a chain are named'),
+    (rope(hinge=PIN | {"inboard": "ground"}), "hinge[0].inboard: each member is connected to"),
+    (rope(hinge=PIN | {"release": 1.0}), "hinge[0].release: members of a chain cannot be rel"),
+    (rope(hinge=PIN | {"initial": {"q": [1, 2]}}), "hinge[0].initial.q: expected 1 entry for a p"),
+    (rope(body=LINK | {"massa": 1}), 'body[0].massa: unknown key; did you mean "mass"?'),
+    (rope(hinges=[PIN]), 'hinges: unknown key; did you mean "hinge"?'),
+    (rope(count=1, hinge=[PIN, PIN]), "hinge: 2 tables for a chain of 1; leave some out or raise"),
+    (rope(body=LINK | {"ends": {}}),
      "body[0].ends: expected one end for the next body, found no end; give it one"),
-    (roped(body=TWO_ENDS), "expected one end for the next body, found tip, side; write end ="),
-    (roped(end="top"), 'body[0].ends: there is no end "top" for the next body; give it ends = {'),
-    (roped(body=LINK | {"ends": {"hinge": [1, 0, 0]}}), "is the name of a hinge; rename this end"),
-    (roped(inboard="rope[4].tip"), 'chain "rope": no hinge connects it to the ground; set inboard'),
-    (roped(inboard="base.tip"), 'chain "rope": inboard: there is no body "base"; use one of'),
+    (rope(body=TWO_ENDS), "expected one end for the next body, found tip, side; write end ="),
+    (rope(end="top"), 'body[0].ends: there is no end "top" for the next body; give it ends = {'),
+    (rope(body=LINK | {"ends": {"hinge": [1, 0, 0]}}), "is the name of a hinge; rename this end"),
+    (rope(inboard="rope[4].tip"), 'chain "rope": no hinge connects it to the ground; set inboard'),
+    (rope(inboard="base.tip"), 'chain "rope": inboard: there is no body "base"; use one of'),
     (arm(chain=[chain(inboard="rod1.tip", position=[1, 0, 0])]), "position: only a chain"),
     (arm(chain=[chain("rod1")]), 'chain "rod1": name: "rod1" is also the name of a body; rename'),
     (arm(chain=[chain("elbow")]), '"elbow" is also the name of a hinge; rename one'),
     (arm(chain=[chain(), chain()]), '"rope" is also the name of chain number 1; rename one'),
     (arm(chain=[chain("a", inboard="b[0].tip"), chain("b", inboard="a[0].tip")]),
      'chain "a": no hinge connects it (with b) to the ground; set inboard = "ground"'),
-    (roped() | {"load": [{"on": "rope[5].tip", "force": [1, 0, 0]}]},
+    (rope() | {"load": [{"on": "rope[5].tip", "force": [1, 0, 0]}]},
      'load number 1: on: there is no body "rope[5]"; the chain "rope" has rope[0] to rope[4]'),
-    (roped() | {"load": [{"on": "rope.tip", "force": [1, 0, 0]}]},
+    (rope() | {"load": [{"on": "rope.tip", "force": [1, 0, 0]}]},
      'there is no body "rope"; the chain "rope" has rope[0] to rope[4]'),
-    (roped() | {"load": [{"on": "rope[last].top", "force": [1, 0, 0]}]},
+    (rope() | {"load": [{"on": "rope[last].top", "force": [1, 0, 0]}]},
      'body "rope[last]" has no end "top"; did you mean "tip"?'),
-    (roped() | {"load": [{"on": "rope[1]", "axes": "rope[9]"}]}, 'axes: there is no body "rop'),
-    (roped() | {"load": [{"on": "rope[1]", "force": ["rope[7].hinge.q", 0, 0]}]},
+    (rope() | {"load": [{"on": "rope[1]", "axes": "rope[9]"}]}, 'axes: there is no body "rop'),
+    (rope() | {"load": [{"on": "rope[1]", "force": ["rope[7].hinge.q", 0, 0]}]},
      "there is no hinge 'rope[7].hinge'; the chain \"rope\" has rope[0].hinge to rope[4].hinge"),
-    (roped() | {"load": [{"on": "rope[1]", "force": ["rope[1].q", 0, 0]}]},
+    (rope() | {"load": [{"on": "rope[1]", "force": ["rope[1].q", 0, 0]}]},
      "there is no hinge 'rope[1]'; the chain \"rope\" has rope[0].hinge to rope[4].hinge"),
-    (roped(hinge={"type": "ball", "law": {"effort": ["q[7]", 0, 0]}}), "hinge[0].law.effort[0]"),
-    (roped() | {"event": [{"when": "t > 1", "do": "release", "hinge": "rope[1].hinge"}]},
+    (rope(hinge={"type": "ball", "law": {"effort": ["q[7]", 0, 0]}}), "hinge[0].law.effort[0]"),
+    (rope() | {"event": [{"when": "t > 1", "do": "release", "hinge": "rope[1].hinge"}]},
      "event number 1: hinge: expected the hinge to release"),
     (arm(chain=[chain()], hinge=[hinge(), hinge("elbow", inboard="rod1.tip", outboard="rope[2]")]),
      'hinge "elbow": outboard: "rope[2]" already has an inboard hinge in its chain'),
@@ -167,4 +167,4 @@ def test_refused_with_chain_key_and_way_out(data: Data, fragment: str) -> None:
 
 
 def test_one_message_for_a_mistake_in_a_million_bodies() -> None:
-    assert message_of(roped(count=1_000_000, body=LINK | {"mass": "one"})).count("\n") == 0
+    assert message_of(rope(count=1_000_000, body=LINK | {"mass": "one"})).count("\n") == 0

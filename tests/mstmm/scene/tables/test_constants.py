@@ -11,7 +11,7 @@ import pytest
 
 from mstmm.errors import SceneError
 from mstmm.scene import Scene
-from tests.support.scenes.minimal import Data, beam, body, hinge, one
+from tests.support.scenes.minimal import Data, beam, body, hinge, one_rod
 
 
 def rod(constants: Any = None, **changes: Any) -> Data:
@@ -20,7 +20,7 @@ def rod(constants: Any = None, **changes: Any) -> Data:
     return data if constants is None else {**data, "constants": constants}
 
 
-def reloaded(scene: Scene) -> Scene:
+def reload_scene(scene: Scene) -> Scene:
     return Scene.from_data(tomllib.loads(scene.to_toml()))
 
 
@@ -37,10 +37,10 @@ def reloaded(scene: Scene) -> Scene:
     ],
 )
 def test_a_number_may_be_a_constant_expression(text: str, value: float) -> None:
-    scene = Scene.from_data(one(initial={"q": [text]}))
+    scene = Scene.from_data(one_rod(initial={"q": [text]}))
     assert scene.hinge[0].initial is not None and scene.hinge[0].initial.q is not None
     assert scene.hinge[0].initial.q[0] == pytest.approx(value, rel=4e-16)
-    assert reloaded(scene) == scene
+    assert reload_scene(scene) == scene
 
 
 def test_numbers_and_expressions_name_constants() -> None:
@@ -59,7 +59,7 @@ def test_numbers_and_expressions_name_constants() -> None:
     assert effort.evaluate(lambda _: 0.2) == pytest.approx(0.5 * math.sin(constants_w() * 0.2))
     text = scene.to_toml()
     assert 'mass = "2*half"' in text and 'whole = "2*half"' in text
-    assert '"half*sin(w*t)"' in text and reloaded(scene) == scene
+    assert '"half*sin(w*t)"' in text and reload_scene(scene) == scene
 
 
 def constants_w() -> float:
@@ -76,12 +76,12 @@ def test_expressions_of_other_constants_are_other_expressions() -> None:
 
 
 def test_normalised_quaternions_keep_how_they_are_written() -> None:
-    data = one(orientation=[1, 0, 0, "half"])
+    data = one_rod(orientation=[1, 0, 0, "half"])
     scene = Scene.from_data({**data, "constants": {"half": 0.5}})
     length = math.hypot(1.0, 0.5)
     assert scene.hinge[0].orientation == pytest.approx((1 / length, 0, 0, 0.5 / length))
     assert 'orientation = [1.0, 0.0, 0.0, "half"]' in scene.to_toml()
-    assert reloaded(scene) == scene
+    assert reload_scene(scene) == scene
 
 
 def test_beams_take_them_everywhere() -> None:
@@ -97,7 +97,7 @@ def test_beams_take_them_everywhere() -> None:
         {"gravity": [0, 0, 0], "constants": {"k": 2.0}, "beam": [table], "hinge": [held]}
     )
     assert scene.beam[0].length == 6.0 and scene.beam[0].ends["mid"].position[0] == 3.0
-    assert reloaded(scene) == scene
+    assert reload_scene(scene) == scene
 
 
 def test_a_written_number_survives_pickling() -> None:
@@ -109,7 +109,7 @@ def test_a_written_number_survives_pickling() -> None:
 @pytest.mark.parametrize("mass", ["2", "2.0", "1+1", " 2e0 ", "+2"])
 def test_a_number_in_quotes_is_a_constant_expression(mass: str) -> None:
     scene = Scene.from_data(rod({}, mass=mass))
-    assert scene.body[0].mass == 2.0 and reloaded(scene) == scene
+    assert scene.body[0].mass == 2.0 and reload_scene(scene) == scene
 
 
 @pytest.mark.parametrize(

@@ -23,7 +23,7 @@ HUB: Data = {"name": "hub", "type": "fixed", "inboard": "ground", "outboard": "l
 BLOCK: Data = {"box": {"size": [1, 0.05, 0.02], "divisions": [20, 1, 1]}} | STEEL
 
 
-def linked(source: Data = BLOCK, **changes: Any) -> Data:
+def link_scene(source: Data = BLOCK, **changes: Any) -> Data:
     """An elastic body on a fixed hinge; `...` removes a key."""
     table = {"name": "link", "modes": 4, "ends": {"root": ROOT, "tip": TIP}} | source | changes
     table = {key: value for key, value in table.items() if value is not ...}
@@ -111,14 +111,14 @@ def test_paths_start_from_the_folder_of_the_scene_file(
 ) -> None:
     """Also where the scene file itself is named from another folder; a path from Python stays."""
     (tmp_path / "a").mkdir()
-    (tmp_path / "a" / "link.json").write_text(json.dumps(linked({"matrices": "link.npz"})))
+    (tmp_path / "a" / "link.json").write_text(json.dumps(link_scene({"matrices": "link.npz"})))
     monkeypatch.chdir(tmp_path)
     assert load_scene("a/link.json").elastic[0].matrices == str(tmp_path / "a" / "link.npz")
     absolute = str(tmp_path / "b" / "link.npz")
-    (tmp_path / "a" / "link.json").write_text(json.dumps(linked({"matrices": absolute})))
+    (tmp_path / "a" / "link.json").write_text(json.dumps(link_scene({"matrices": absolute})))
     assert load_scene("a/link.json").elastic[0].matrices == absolute
-    assert Scene(**linked({"matrices": "link.npz"})).elastic[0].matrices == "link.npz"
-    assert Scene(**linked({"matrices": Path("x/link.npz")})).elastic[0].matrices == "x/link.npz"
+    assert Scene(**link_scene({"matrices": "link.npz"})).elastic[0].matrices == "link.npz"
+    assert Scene(**link_scene({"matrices": Path("x/link.npz")})).elastic[0].matrices == "x/link.npz"
 
 
 def test_no_file_is_opened_by_loading_a_scene(tmp_path: Path) -> None:
@@ -126,17 +126,17 @@ def test_no_file_is_opened_by_loading_a_scene(tmp_path: Path) -> None:
     trap = tmp_path / "link.npz"
     trap.write_bytes(b"not a zip")
     path = tmp_path / "link.json"
-    path.write_text(json.dumps(linked({"matrices": "link.npz"})))
+    path.write_text(json.dumps(link_scene({"matrices": "link.npz"})))
     assert load_scene(path).elastic[0].matrices == str(trap)
 
 
 def test_arrays_of_numpy_and_scipy_and_lists_are_the_same() -> None:
-    dense = Scene(**linked(arrays(), frame="tangent"))
+    dense = Scene(**link_scene(arrays(), frame="tangent"))
     table = arrays()["arrays"]
     lists = {"arrays": {key: np.asarray(value).tolist() for key, value in table.items()}}
     sparse = {"arrays": table | {"mass": csr_array(table["mass"])}}
-    assert Scene(**linked(lists, frame="tangent")) == dense
-    assert Scene(**linked(sparse, frame="tangent")) == dense
+    assert Scene(**link_scene(lists, frame="tangent")) == dense
+    assert Scene(**link_scene(sparse, frame="tangent")) == dense
     held = dense.elastic[0].arrays
     assert held is not None and np.array_equal(held.mass, np.eye(6))
     assert held.scalar_mass is None and held.order == "node"
@@ -145,68 +145,87 @@ def test_arrays_of_numpy_and_scipy_and_lists_are_the_same() -> None:
 
 ENDS = "ends.root: expected exactly one of nodes, box, plane, sphere, set for the nodes of this end"
 BAD: list[tuple[Data, str]] = [
-    (linked({}), 'elastic "link": expected exactly one of matrices, arrays, mesh, box as the'),
-    (linked(matrices="a.npz"), "found matrices and box; write for example matrices = \"link.npz\""),
-    (linked({"matrices": "a.csv"}), "matrices: expected the path of a file ending in .npz, found"),
-    (linked({"matrices": 3}), "matrices: expected the path of a file ending in .npz, found 3"),
-    (linked({"matrices": "a\0.npz"}), "matrices: expected the path of a file ending in .npz"),
-    (linked({"mesh": ""} | STEEL), "mesh: expected the path of a file, found ''"),
-    (linked({"matrices": "a.npz"}, young=1), "young: matrices already contain the material;"),
-    (linked(arrays(), density=1), "density: arrays already contain the material; leave it out"),
-    (linked({"matrices": "a.npz"}, order=2), "order: only mesh and box have an element order"),
-    (linked(scale=0.001), "scale: only a mesh file has its own length unit; leave it out"),
-    (linked(young=...), "young: missing; a body from a box needs Young's modulus in Pa"),
-    (linked(young=0), "young: expected a number in Pa, more than 0, found 0"),
-    (linked(density=-1), "density: expected a number in kg/m^3, more than 0, found -1"),
-    (linked(poisson=0.5), "found 0.5; no element is incompressible"),
-    (linked(poisson=-1), "poisson: expected Poisson's ratio, more than -1 and less than 0.5"),
-    (linked(order=3), "order: expected a whole number from 1 to 2, found 3"),
-    (linked(modes=-1), 'modes: expected a whole number from 0 to 200 or "auto", found -1'),
-    (linked(modes="some"), "found 'some'"),
-    (linked(frame="chord"), 'frame: expected "auto", "tangent" or "mean", found \'chord\''),
-    (linked(highest_frequency=0), "highest_frequency: expected a number in rad/s, more than 0"),
-    (linked(materials={}), "materials: unknown key; did you mean \"matrices\"?"),
-    (linked(initial={"eta": [1], "etad": [1, 2]}), "initial.etad: expected as many entries as eta"),
+    (link_scene({}), 'elastic "link": expected exactly one of matrices, arrays, mesh, box as the'),
+    (link_scene(matrices="a.npz"),
+     "found matrices and box; write for example matrices = \"link.npz\""),
+    (link_scene({"matrices": "a.csv"}),
+     "matrices: expected the path of a file ending in .npz, found"),
+    (link_scene({"matrices": 3}), "matrices: expected the path of a file ending in .npz, found 3"),
+    (link_scene({"matrices": "a\0.npz"}), "matrices: expected the path of a file ending in .npz"),
+    (link_scene({"mesh": ""} | STEEL), "mesh: expected the path of a file, found ''"),
+    (link_scene({"matrices": "a.npz"}, young=1), "young: matrices already contain the material;"),
+    (link_scene(arrays(), density=1), "density: arrays already contain the material; leave it out"),
+    (link_scene({"matrices": "a.npz"}, order=2), "order: only mesh and box have an element order"),
+    (link_scene(scale=0.001), "scale: only a mesh file has its own length unit; leave it out"),
+    (link_scene(young=...), "young: missing; a body from a box needs Young's modulus in Pa"),
+    (link_scene(young=0), "young: expected a number in Pa, more than 0, found 0"),
+    (link_scene(density=-1), "density: expected a number in kg/m^3, more than 0, found -1"),
+    (link_scene(poisson=0.5), "found 0.5; no element is incompressible"),
+    (link_scene(poisson=-1), "poisson: expected Poisson's ratio, more than -1 and less than 0.5"),
+    (link_scene(order=3), "order: expected a whole number from 1 to 2, found 3"),
+    (link_scene(modes=-1), 'modes: expected a whole number from 0 to 200 or "auto", found -1'),
+    (link_scene(modes="some"), "found 'some'"),
+    (link_scene(frame="chord"), 'frame: expected "auto", "tangent" or "mean", found \'chord\''),
+    (link_scene(highest_frequency=0), "highest_frequency: expected a number in rad/s, more than 0"),
+    (link_scene(materials={}), "materials: unknown key; did you mean \"matrices\"?"),
+    (link_scene(initial={"eta": [1], "etad": [1, 2]}),
+     "initial.etad: expected as many entries as eta"),
     # box
-    (linked(box={"size": [1, 0, 1], "divisions": [1, 1, 1]}), "box.size: expected three numbers"),
-    (linked(box={"size": [1, 1, 1], "divisions": [1, 1.5, 1]}), "box.divisions: expected three"),
-    (linked(box={"size": [1, 1, 1], "divisions": [0, 1, 1]}), "numbers from 1 to 10000, found"),
-    (linked(box={"size": [1, 1, 1]}), "box.divisions: missing; expected three whole numbers"),
+    (link_scene(box={"size": [1, 0, 1], "divisions": [1, 1, 1]}),
+     "box.size: expected three numbers"),
+    (link_scene(box={"size": [1, 1, 1], "divisions": [1, 1.5, 1]}),
+     "box.divisions: expected three"),
+    (link_scene(box={"size": [1, 1, 1], "divisions": [0, 1, 1]}), "numbers from 1 to 10000, found"),
+    (link_scene(box={"size": [1, 1, 1]}), "box.divisions: missing; expected three whole numbers"),
     # ends
-    (linked(ends=...), "ends: missing; an elastic body connects only at its ends"),
-    (linked(ends={"a b": ROOT}), "expected the name of an end, found 'a b'"),
-    (linked(ends={"root": {}}), f"{ENDS}, found none; write for example plane = [1, 0, 0, 0.0]"),
-    (linked(ends={"root": ROOT | {"set": "a"}}), f"{ENDS}, found plane, set"),
-    (linked(ends={"root": {"set": "a"}}), "ends.root.set: only a mesh file has named surfaces"),
-    (linked(ends={"root": {"plane": [0, 0, 0, 1]}}), "ends.root.plane: expected a normal that is"),
-    (linked(ends={"root": {"plane": [1, 0, 0]}}), "ends.root.plane: expected [nx, ny, nz, d]"),
-    (linked(ends={"root": {"sphere": [0, 0, 0, 0]}}), "ends.root.sphere[3]: expected a radius in"),
-    (linked(ends={"root": {"box": [[1, 0, 0], [0, 1, 1]]}}), "ends.root.box: expected two corners"),
-    (linked(ends={"root": {"box": [[1, 0, 0]]}}), "ends.root.box: expected two corners"),
-    (linked(ends={"root": {"nodes": []}}), "ends.root.nodes: expected numbers of nodes, from 0"),
-    (linked(ends={"root": {"nodes": [-1]}}), "ends.root.nodes[0]: expected a whole number from 0"),
-    (linked(arrays(), ends={"root": {"nodes": [2]}}), "expected numbers from 0 to 1, found 2"),
-    (linked(ends={"root": ROOT | {"coupling": "soft"}}), 'coupling: expected "rigid" or "mean"'),
-    (linked(ends={"root": ROOT | {"static_shapes": "no"}}), "static_shapes: expected true or"),
+    (link_scene(ends=...), "ends: missing; an elastic body connects only at its ends"),
+    (link_scene(ends={"a b": ROOT}), "expected the name of an end, found 'a b'"),
+    (link_scene(ends={"root": {}}),
+     f"{ENDS}, found none; write for example plane = [1, 0, 0, 0.0]"),
+    (link_scene(ends={"root": ROOT | {"set": "a"}}), f"{ENDS}, found plane, set"),
+    (link_scene(ends={"root": {"set": "a"}}), "ends.root.set: only a mesh file has named surfaces"),
+    (link_scene(ends={"root": {"plane": [0, 0, 0, 1]}}),
+     "ends.root.plane: expected a normal that is"),
+    (link_scene(ends={"root": {"plane": [1, 0, 0]}}), "ends.root.plane: expected [nx, ny, nz, d]"),
+    (link_scene(ends={"root": {"sphere": [0, 0, 0, 0]}}),
+     "ends.root.sphere[3]: expected a radius in"),
+    (link_scene(ends={"root": {"box": [[1, 0, 0], [0, 1, 1]]}}),
+     "ends.root.box: expected two corners"),
+    (link_scene(ends={"root": {"box": [[1, 0, 0]]}}), "ends.root.box: expected two corners"),
+    (link_scene(ends={"root": {"nodes": []}}),
+     "ends.root.nodes: expected numbers of nodes, from 0"),
+    (link_scene(ends={"root": {"nodes": [-1]}}),
+     "ends.root.nodes[0]: expected a whole number from 0"),
+    (link_scene(arrays(), ends={"root": {"nodes": [2]}}), "expected numbers from 0 to 1, found 2"),
+    (link_scene(ends={"root": ROOT | {"coupling": "soft"}}),
+     'coupling: expected "rigid" or "mean"'),
+    (link_scene(ends={"root": ROOT | {"static_shapes": "no"}}), "static_shapes: expected true or"),
     # arrays
-    (linked(arrays(mass=np.eye(5))), "arrays.mass: expected 6 x 6 or 12 x 12 numbers for 2 nodes"),
-    (linked(arrays(mass=np.eye(5))), "found 5 x 5"),
-    (linked(arrays(stiffness=np.eye(12))), "as many unknowns as the mass matrix, 6, found 12"),
-    (linked(arrays(scalar_mass=np.eye(3))), "arrays.scalar_mass: expected 2 x 2 numbers for 2 nod"),
-    (linked(arrays(nodes=0)), "the mass matrix, rows of numbers"),
-    (linked(arrays(mass=[[1, 2], [3]])), "arrays.mass[1]: expected rows of 2 numbers, found 1"),
-    (linked(arrays(mass=np.full((6, 6), np.nan))), "arrays.mass[0][0]: expected a number, found"),
-    (linked(arrays(mass="M")), "arrays.mass: expected the mass matrix, rows of numbers, found 'M'"),
-    (linked(arrays(mass=np.zeros((3001, 1)))), "1 to 3000 rows, found 3001; save larger ones to a"),
-    (linked(arrays(order="rows")), 'arrays.order: expected "node" or "component"'),
+    (link_scene(arrays(mass=np.eye(5))),
+     "arrays.mass: expected 6 x 6 or 12 x 12 numbers for 2 nodes"),
+    (link_scene(arrays(mass=np.eye(5))), "found 5 x 5"),
+    (link_scene(arrays(stiffness=np.eye(12))), "as many unknowns as the mass matrix, 6, found 12"),
+    (link_scene(arrays(scalar_mass=np.eye(3))),
+     "arrays.scalar_mass: expected 2 x 2 numbers for 2 nod"),
+    (link_scene(arrays(nodes=0)), "the mass matrix, rows of numbers"),
+    (link_scene(arrays(mass=[[1, 2], [3]])), "arrays.mass[1]: expected rows of 2 numbers, found 1"),
+    (link_scene(arrays(mass=np.full((6,
+     6), np.nan))), "arrays.mass[0][0]: expected a number, found"),
+    (link_scene(arrays(mass="M")),
+     "arrays.mass: expected the mass matrix, rows of numbers, found 'M'"),
+    (link_scene(arrays(mass=np.zeros((3001,
+     1)))), "1 to 3000 rows, found 3001; save larger ones to a"),
+    (link_scene(arrays(order="rows")), 'arrays.order: expected "node" or "component"'),
     # among the other elements
-    (linked() | {"hinge": []}, 'elastic "link": no hinge connects it to the ground'),
-    (linked() | {"load": [{"on": "link"}]}, '"link" is an elastic body, which connects only at'),
-    (linked() | {"load": [{"on": "link"}]}, 'ends; write "link.root"'),
-    (linked() | {"load": [{"on": "link.top"}]}, 'body "link" has no end "top"; did you mean'),
-    (linked() | {"load": [{"on": "link", "force_per_length": [1, 0, 0]}]}, '"link" is an elastic'),
-    (linked() | {"body": [{"name": "link", "mass": 1}]}, '"link" is also the name of a body;'),
-    (linked() | {"hinge": [HUB | {"outboard": "link"}]},
+    (link_scene() | {"hinge": []}, 'elastic "link": no hinge connects it to the ground'),
+    (link_scene() | {"load": [{"on": "link"}]},
+     '"link" is an elastic body, which connects only at'),
+    (link_scene() | {"load": [{"on": "link"}]}, 'ends; write "link.root"'),
+    (link_scene() | {"load": [{"on": "link.top"}]}, 'body "link" has no end "top"; did you mean'),
+    (link_scene() | {"load": [{"on": "link", "force_per_length": [1, 0, 0]}]},
+     '"link" is an elastic'),
+    (link_scene() | {"body": [{"name": "link", "mass": 1}]}, '"link" is also the name of a body;'),
+    (link_scene() | {"hinge": [HUB | {"outboard": "link"}]},
      'hinge "hub": outboard: "link" is an elastic body, which connects only at its ends; write'),
 ]  # fmt: skip
 
@@ -223,7 +242,7 @@ def test_refused_with_element_key_and_way_out(data: Data, fragment: str) -> None
 def test_a_tangent_frame_where_the_hinge_leaves_the_end_free(
     kind: str, frame: str, count: int
 ) -> None:
-    data = linked(frame=frame) | {"hinge": [HUB | {"type": kind}]}
+    data = link_scene(frame=frame) | {"hinge": [HUB | {"type": kind}]}
     found = Scene(**data).warnings
     assert len(found) == count
     assert all(w.startswith('elastic "link": frame: a tangent frame at "root"') for w in found)

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import mstmm
-from tests.support.scenes.minimal import one
+from tests.support.scenes.minimal import one_rod
 
 
 @pytest.mark.parametrize(
@@ -26,14 +26,14 @@ from tests.support.scenes.minimal import one
 )
 def test_a_number_as_text_is_answered_with_the_number_to_write(written: str, words: str) -> None:
     with pytest.raises(mstmm.SceneError) as refused:
-        mstmm.Scene.from_data(one(initial={"q": [written]}))
+        mstmm.Scene.from_data(one_rod(initial={"q": [written]}))
     assert words in str(refused.value)
     assert ("without quotes" in words) == ("without quotes" in str(refused.value))
 
 
 def test_a_unit_in_an_expression_is_named_too() -> None:
     with pytest.raises(mstmm.SceneError, match=r"write \* for a product .* write 0\.523598775598"):
-        mstmm.Scene.from_data(one(drive="30 deg"))
+        mstmm.Scene.from_data(one_rod(drive="30 deg"))
 
 
 STOPS = {"lower": -90, "upper": 45, "stiffness": 1e5}
@@ -51,7 +51,7 @@ STOPS = {"lower": -90, "upper": 45, "stiffness": 1e5}
     ],
 )
 def test_angles_of_more_than_a_turn_are_noted(changes: dict[str, Any], notes: list[str]) -> None:
-    found = mstmm.Scene.from_data(one(**changes)).warnings
+    found = mstmm.Scene.from_data(one_rod(**changes)).warnings
     assert len(found) == len(notes)
     for note, text in zip(notes, found, strict=True):
         assert note in text and "if degrees were meant, write" in text
@@ -60,14 +60,14 @@ def test_angles_of_more_than_a_turn_are_noted(changes: dict[str, Any], notes: li
 def test_angles_of_bushings_are_noted() -> None:
     mount = {"from": "ground", "to": "rod1", "orientation": [30, 0, 0], "stiffness": [1.0] * 6,
              "rest": {"position": [0, 0, 0], "orientation": [0, 45, 0]}}  # fmt: skip
-    found = mstmm.Scene.from_data(one() | {"bushing": [mount]}).warnings
+    found = mstmm.Scene.from_data(one_rod() | {"bushing": [mount]}).warnings
     assert [text.partition(" rad")[0] for text in found] == [
         'bushing "bushing1": orientation: 30', 'bushing "bushing1": rest: 45',
     ]  # fmt: skip
 
 
 def test_the_note_reaches_the_result() -> None:
-    run = mstmm.compile(mstmm.Scene.from_data(one())).simulate(0.0)
+    run = mstmm.compile(mstmm.Scene.from_data(one_rod())).simulate(0.0)
     assert not any("degrees" in text for text in run.warnings)
-    turned = mstmm.Scene.from_data(one(initial={"q": [90]}))
+    turned = mstmm.Scene.from_data(one_rod(initial={"q": [90]}))
     assert any("1.5708" in text for text in mstmm.compile(turned).simulate(0.0).warnings)

@@ -8,7 +8,7 @@ import pytest
 
 from mstmm.errors import SceneError
 from mstmm.scene import Scene
-from tests.support.scenes.minimal import Data, arm, body, changed, hinge, one
+from tests.support.scenes.minimal import Data, arm, body, change_value, hinge, one_rod
 
 NAN, INF = float("nan"), float("inf")
 
@@ -34,7 +34,7 @@ def in_hinge(**changes: Any) -> Data:
 
 BAD: list[tuple[Data, str]] = [
     # the scene itself
-    (changed(arm(), "gravity", to=...), "gravity: missing; expected three numbers in m/s^2"),
+    (change_value(arm(), "gravity", to=...), "gravity: missing; expected three numbers in m/s^2"),
     (
         arm(gravity=9.81),
         "gravity: expected three numbers in m/s^2, such as [0, -9.81, 0], found 9.81",
@@ -60,7 +60,7 @@ BAD: list[tuple[Data, str]] = [
     (arm(body=[]), "body: a scene needs at least one body"),
     # bodies
     (
-        changed(arm(), "body", 0, "name", to=...),
+        change_value(arm(), "body", 0, "name", to=...),
         "body number 1: name: missing; expected the body's name",
     ),
     (in_body(name="1rod"), "name: expected the body's name: a letter, then letters, digits or _"),
@@ -73,7 +73,7 @@ BAD: list[tuple[Data, str]] = [
     (in_body(name="ground"), '"ground" is reserved'),
     (in_body(name=7), "found 7"),
     (
-        changed(arm(), "body", 0, "mass", to=...),
+        change_value(arm(), "body", 0, "mass", to=...),
         'body "rod1": mass: missing; expected a number in kg',
     ),
     (in_body(mass=-1), 'body "rod1": mass: expected a number in kg, 0 or more, found -1'),
@@ -121,10 +121,10 @@ BAD: list[tuple[Data, str]] = [
     # hinges: what they join
     (arm(hinge=[hinge(), hinge(outboard="rod2")]), '"shoulder" is also the name of hinge number 1'),
     (
-        changed(arm(), "hinge", 0, "type", to=...),
+        change_value(arm(), "hinge", 0, "type", to=...),
         'hinge "shoulder": type: missing; expected a hinge type: fixed, pin, prismatic, screw',
     ),
-    (changed(arm(), "hinge", 0, "outboard", to=...), 'hinge "shoulder": outboard: missing'),
+    (change_value(arm(), "hinge", 0, "outboard", to=...), 'hinge "shoulder": outboard: missing'),
     (in_hinge(inboard="grnd"), 'there is no body "grnd"'),
     (in_hinge(inboard="ground.tip"), 'expected "ground", which has no ends'),
     (in_hinge(inboard="a.b.c"), "inboard: expected a body or an end of one"),
@@ -142,129 +142,147 @@ BAD: list[tuple[Data, str]] = [
         "a quaternion of zero length; use [1, 0, 0, 0] for no rotation",
     ),
     (in_hinge(orientation=[1, 2]), "[roll, pitch, yaw] in rad, a quaternion"),
-    (changed(arm(), "hinge", 1, "position", to=[1, 0, 0]), 'define an end of "rod1" there'),
+    (change_value(arm(), "hinge", 1, "position", to=[1, 0, 0]), 'define an end of "rod1" there'),
     # keys of the types
-    (one(type="fixed", axis=[1, 0, 0]), "a fixed hinge has no axis"),
-    (one(type="gimbal", axis=[1, 0, 0]), "rotate it by orientation"),
-    (one(axis2=[1, 0, 0]), "a pin hinge has no axis2"),
-    (one(normal=[1, 0, 0]), "a pin hinge has no normal; use axis"),
-    (one(lead=0.1), "a pin hinge has no lead"),
-    (one(type="screw"), "lead: a screw needs its lead in m per turn"),
-    (one(type="screw", lead=0), 'or type = "pin"'),
-    (one(type="screw", lead="far"), "lead: expected a number in m per turn"),
-    (one(type="universal"), "axis2: a universal hinge needs its second axis"),
-    (one(type="universal", axis2=[0, 0, -2]), "is parallel to axis [0, 0, 1]"),
-    (one(type="universal", axis=[1, 1, 0], axis2=[1, 1, 1e-9]), "change one of them"),
-    (one(type="planar", axis2=[0, 0, 1]), "axis2 [0, 0, 1] is parallel to normal"),
-    (one(type="planar", normal=[1, 0, 0], axis=[0, 1, 0]), "differ; give one"),
-    (one(parameters={"radius": 1.0}), "a pin hinge has no parameters"),
+    (one_rod(type="fixed", axis=[1, 0, 0]), "a fixed hinge has no axis"),
+    (one_rod(type="gimbal", axis=[1, 0, 0]), "rotate it by orientation"),
+    (one_rod(axis2=[1, 0, 0]), "a pin hinge has no axis2"),
+    (one_rod(normal=[1, 0, 0]), "a pin hinge has no normal; use axis"),
+    (one_rod(lead=0.1), "a pin hinge has no lead"),
+    (one_rod(type="screw"), "lead: a screw needs its lead in m per turn"),
+    (one_rod(type="screw", lead=0), 'or type = "pin"'),
+    (one_rod(type="screw", lead="far"), "lead: expected a number in m per turn"),
+    (one_rod(type="universal"), "axis2: a universal hinge needs its second axis"),
+    (one_rod(type="universal", axis2=[0, 0, -2]), "is parallel to axis [0, 0, 1]"),
+    (one_rod(type="universal", axis=[1, 1, 0], axis2=[1, 1, 1e-9]), "change one of them"),
+    (one_rod(type="planar", axis2=[0, 0, 1]), "axis2 [0, 0, 1] is parallel to normal"),
+    (one_rod(type="planar", normal=[1, 0, 0], axis=[0, 1, 0]), "differ; give one"),
+    (one_rod(parameters={"radius": 1.0}), "a pin hinge has no parameters"),
     # start values
     (
-        one(initial={"q": [1, 2]}),
+        one_rod(initial={"q": [1, 2]}),
         "initial.q: expected 1 entry for a pin hinge: angle (rad), found 2",
     ),
-    (one(initial={"u": [1, 2]}), "initial.u: expected 1 entry for a pin hinge: angle_rate (rad/s)"),
-    (one(initial={"q": ["x"]}), "initial.q[0]: expected a number, found 'x'"),
-    (one(initial={"x": [1]}), "initial.x: unknown key"),
-    (one(initial=[0.3]), "initial: expected a table, found [0.3]"),
-    (one(type="ball", initial={"q": [1, 0, 0]}), "expected 4 entries for a ball hinge"),
-    (one(type="ball", initial={"q": [0, 0, 0, 0]}), "a quaternion of zero length"),
-    (one(type="free", initial={"q": [0] * 7}), "a quaternion of zero length"),
-    (one(type="fixed", initial={"q": [1]}), "expected 0 entries for a fixed hinge"),
-    # laws
-    (one(law={"stiffness": -1}), "law.stiffness: expected a number in N/m or N m/rad, 0 or more"),
     (
-        one(law={"damping": [-1]}),
+        one_rod(initial={"u": [1, 2]}),
+        "initial.u: expected 1 entry for a pin hinge: angle_rate (rad/s)",
+    ),
+    (one_rod(initial={"q": ["x"]}), "initial.q[0]: expected a number, found 'x'"),
+    (one_rod(initial={"x": [1]}), "initial.x: unknown key"),
+    (one_rod(initial=[0.3]), "initial: expected a table, found [0.3]"),
+    (one_rod(type="ball", initial={"q": [1, 0, 0]}), "expected 4 entries for a ball hinge"),
+    (one_rod(type="ball", initial={"q": [0, 0, 0, 0]}), "a quaternion of zero length"),
+    (one_rod(type="free", initial={"q": [0] * 7}), "a quaternion of zero length"),
+    (one_rod(type="fixed", initial={"q": [1]}), "expected 0 entries for a fixed hinge"),
+    # laws
+    (
+        one_rod(law={"stiffness": -1}),
+        "law.stiffness: expected a number in N/m or N m/rad, 0 or more",
+    ),
+    (
+        one_rod(law={"damping": [-1]}),
         "law.damping[0]: expected a number in N s/m or N m s/rad, 0 or more, found -1",
     ),
-    (one(law={"inertia": -1}), "law.inertia: expected"),
-    (one(law={"stifness": 1}), 'law.stifness: unknown key; did you mean "stiffness"?'),
-    (one(law={"stiffness": [1, 2]}), "law.stiffness: expected 1 entry for a pin hinge"),
-    (one(law={"effort": "2*"}), "law.effort: the expression ends where a value is expected"),
-    (one(law={"effort": ["1", "2"]}), "law.effort: expected 1 entry"),
-    (one(law={"effort": "t < 1"}), "found a comparison; write where(t < 1, 1, 0)"),
-    (one(law={"effort": "torque"}), "law.effort[0]: 'torque' is unknown"),
+    (one_rod(law={"inertia": -1}), "law.inertia: expected"),
+    (one_rod(law={"stifness": 1}), 'law.stifness: unknown key; did you mean "stiffness"?'),
+    (one_rod(law={"stiffness": [1, 2]}), "law.stiffness: expected 1 entry for a pin hinge"),
+    (one_rod(law={"effort": "2*"}), "law.effort: the expression ends where a value is expected"),
+    (one_rod(law={"effort": ["1", "2"]}), "law.effort: expected 1 entry"),
+    (one_rod(law={"effort": "t < 1"}), "found a comparison; write where(t < 1, 1, 0)"),
+    (one_rod(law={"effort": "torque"}), "law.effort[0]: 'torque' is unknown"),
     (
-        one(law={"effort": "1 + " * 40 + "torque + 2" + " + 1" * 40}),
+        one_rod(law={"effort": "1 + " * 40 + "torque + 2" + " + 1" * 40}),
         "one of t, q, u, pi (character 161: ...+ 1 + 1 + 1 + 1 + 1 + 1 + 1 +  -->torque + 2",
     ),
-    (one(law={"effort": "angle"}), "one of t, q, u, pi"),
-    (one(law={"effort": "q[1]"}), 'the last entry of hinge "shoulder" is [0]'),
-    (one(law={"effort": "elbow.q"}), "there is no hinge 'elbow'; the only one is shoulder"),
+    (one_rod(law={"effort": "angle"}), "one of t, q, u, pi"),
+    (one_rod(law={"effort": "q[1]"}), 'the last entry of hinge "shoulder" is [0]'),
+    (one_rod(law={"effort": "elbow.q"}), "there is no hinge 'elbow'; the only one is shoulder"),
     (
-        one(law={"effort": "shoulder.x"}),
+        one_rod(law={"effort": "shoulder.x"}),
         "positions and velocities of bodies are available only in events",
     ),
-    (one(law={"effort": "shoulder.angle"}), "a hinge has shoulder.q and shoulder.u"),
+    (one_rod(law={"effort": "shoulder.angle"}), "a hinge has shoulder.q and shoulder.u"),
     (
-        one(law={"effort": "rod1.x"}),
+        one_rod(law={"effort": "rod1.x"}),
         "positions and velocities of bodies are available only in events",
     ),
-    (one(type="universal", axis2=[0, 1, 0], law={"effort": ["q", 0]}), "write q[0] to q[1]"),
-    (one(type="fixed", law={"stiffness": 1}), "a fixed hinge has no coordinate for a law"),
+    (one_rod(type="universal", axis2=[0, 1, 0], law={"effort": ["q", 0]}), "write q[0] to q[1]"),
+    (one_rod(type="fixed", law={"stiffness": 1}), "a fixed hinge has no coordinate for a law"),
     (
-        one(type="cylindrical", law={"stiffness": 1}),
+        one_rod(type="cylindrical", law={"stiffness": 1}),
         "whose efforts are in N, N*m; give a list with 2",
     ),
-    (one(type="free", law={"damping": 1}), "give a list with 6 entries"),
+    (one_rod(type="free", law={"damping": 1}), "give a list with 6 entries"),
     (
-        one(type="ball", law={"rest": [1, 0, 0]}),
+        one_rod(type="ball", law={"rest": [1, 0, 0]}),
         "the rest angle of the rotation of a ball hinge is 0",
     ),
-    (one(type="ball", law={"limits": {"lower": 0, "stiffness": 1}}), "a ball hinge has no limits"),
     (
-        one(law={"friction": {"coulomb": -1}}),
+        one_rod(type="ball", law={"limits": {"lower": 0, "stiffness": 1}}),
+        "a ball hinge has no limits",
+    ),
+    (
+        one_rod(law={"friction": {"coulomb": -1}}),
         "law.friction[0].coulomb: expected a number in N or N m",
     ),
     (
-        one(law={"friction": {"coulomb": 2, "static": 1}}),
+        one_rod(law={"friction": {"coulomb": 2, "static": 1}}),
         "static friction 1 is below coulomb friction 2",
     ),
-    (one(law={"friction": {"coulomb": 2, "stribeck_velocity": 0}}), "more than 0, found 0"),
-    (one(law={"friction": {"viscous": 2}}), "law.friction[0].viscous: unknown key"),
-    (one(law={"friction": 1}), "law.friction: expected a table, or a list of tables"),
+    (one_rod(law={"friction": {"coulomb": 2, "stribeck_velocity": 0}}), "more than 0, found 0"),
+    (one_rod(law={"friction": {"viscous": 2}}), "law.friction[0].viscous: unknown key"),
+    (one_rod(law={"friction": 1}), "law.friction: expected a table, or a list of tables"),
     (
-        one(law={"limits": {"lower": 1, "upper": -1, "stiffness": 1}}),
+        one_rod(law={"limits": {"lower": 1, "upper": -1, "stiffness": 1}}),
         "lower (1) must be below upper (-1)",
     ),
-    (one(law={"limits": {"lower": 1, "upper": 1, "stiffness": 1}}), "must be below upper"),
-    (one(law={"limits": {"lower": 1}}), "a stop needs a stiffness above 0"),
-    (one(law={"limits": {"stiffness": 1}}), "limits need lower, upper or both"),
-    (one(law={"limits": {"lower": NAN, "stiffness": 1}}), "law.limits[0].lower: expected a number"),
-    (one(law=3), "law: expected a table, found 3"),
-    # drives and release
-    (one(drive="sin(t"), "drive: this parenthesis is not closed"),
-    (one(drive="q"), "drive: expected a function of t only, found 'q'; use law.effort"),
-    (one(drive="0.1*q + t"), "found 'q' (in '0.1*q + t'); use law.effort"),
-    (one(drive="+".join(f"sin({k}*t)" for k in range(20)) + "+q"), "*t)+ -->q); use law.effort"),
-    (one(drive="t + other.q"), "found 'other.q'"),
-    (one(drive=["t", "t"]), "drive: expected 1 entry for a pin hinge: angle (rad), found 2"),
-    (one(drive="sqrt(t)"), "is not finite at t = 0"),
-    (one(drive="t > 1"), "found a comparison"),
-    (one(drive="t" + "*1.1e-300" * 400), "contain a constant of thousands of digits"),
-    (one(drive="t*1e300*1e300"), "contain a constant above 1.8e308; scale"),
-    (one(drive=NAN), "which is not finite"),
-    (one(drive={}), "drive: expected a number or an expression"),
-    (one(drive="sin(t)", initial={"q": [0]}), "the drive already gives the initial values"),
-    (one(drive="sin(t)", initial={"u": [0]}), "the drive already gives the initial values"),
-    (one(type="ball", drive="t"), "a ball hinge cannot be driven; use gimbal or universal hinges"),
-    (one(type="free", drive=["t"] * 6), "a free hinge cannot be driven"),
-    (one(type="elastic", drive=["t"] * 6), "an elastic hinge cannot be driven"),
-    (one(type="fixed", drive="t"), "expected 0 entries for a fixed hinge"),
-    (one(type="cylindrical", drive="t"), "displacement (m), angle (rad), found 1"),
+    (one_rod(law={"limits": {"lower": 1, "upper": 1, "stiffness": 1}}), "must be below upper"),
+    (one_rod(law={"limits": {"lower": 1}}), "a stop needs a stiffness above 0"),
+    (one_rod(law={"limits": {"stiffness": 1}}), "limits need lower, upper or both"),
     (
-        one(type="cylindrical", drive=["free", "1 + t"], initial={"q": [0, 0]}),
+        one_rod(law={"limits": {"lower": NAN, "stiffness": 1}}),
+        "law.limits[0].lower: expected a number",
+    ),
+    (one_rod(law=3), "law: expected a table, found 3"),
+    # drives and release
+    (one_rod(drive="sin(t"), "drive: this parenthesis is not closed"),
+    (one_rod(drive="q"), "drive: expected a function of t only, found 'q'; use law.effort"),
+    (one_rod(drive="0.1*q + t"), "found 'q' (in '0.1*q + t'); use law.effort"),
+    (
+        one_rod(drive="+".join(f"sin({k}*t)" for k in range(20)) + "+q"),
+        "*t)+ -->q); use law.effort",
+    ),
+    (one_rod(drive="t + other.q"), "found 'other.q'"),
+    (one_rod(drive=["t", "t"]), "drive: expected 1 entry for a pin hinge: angle (rad), found 2"),
+    (one_rod(drive="sqrt(t)"), "is not finite at t = 0"),
+    (one_rod(drive="t > 1"), "found a comparison"),
+    (one_rod(drive="t" + "*1.1e-300" * 400), "contain a constant of thousands of digits"),
+    (one_rod(drive="t*1e300*1e300"), "contain a constant above 1.8e308; scale"),
+    (one_rod(drive=NAN), "which is not finite"),
+    (one_rod(drive={}), "drive: expected a number or an expression"),
+    (one_rod(drive="sin(t)", initial={"q": [0]}), "the drive already gives the initial values"),
+    (one_rod(drive="sin(t)", initial={"u": [0]}), "the drive already gives the initial values"),
+    (
+        one_rod(type="ball", drive="t"),
+        "a ball hinge cannot be driven; use gimbal or universal hinges",
+    ),
+    (one_rod(type="free", drive=["t"] * 6), "a free hinge cannot be driven"),
+    (one_rod(type="elastic", drive=["t"] * 6), "an elastic hinge cannot be driven"),
+    (one_rod(type="fixed", drive="t"), "expected 0 entries for a fixed hinge"),
+    (one_rod(type="cylindrical", drive="t"), "displacement (m), angle (rad), found 1"),
+    (
+        one_rod(type="cylindrical", drive=["free", "1 + t"], initial={"q": [0, 0]}),
         "initial.q[1]: expected 1, the start of the drive, found 0",
     ),
     (
-        one(type="cylindrical", drive=["free", "1 + t"], initial={"u": [0, 0]}),
+        one_rod(type="cylindrical", drive=["free", "1 + t"], initial={"u": [0, 0]}),
         "initial.u[1]: expected 1, the start of the drive, found 0",
     ),
-    (one(release="t >= 1"), "only a driven or fixed hinge can be released"),
-    (one(drive="t", release="t"), "release: expected a time in s or a comparison"),
-    (one(drive="t", release=NAN), "which is not finite"),
-    (one(drive="t", release=True), "release: expected a time in s or a comparison"),
-    (one(drive="t", release="rod2.x > 1"), "there is no body 'rod2'; did you mean \"rod1\"?"),
+    (one_rod(release="t >= 1"), "only a driven or fixed hinge can be released"),
+    (one_rod(drive="t", release="t"), "release: expected a time in s or a comparison"),
+    (one_rod(drive="t", release=NAN), "which is not finite"),
+    (one_rod(drive="t", release=True), "release: expected a time in s or a comparison"),
+    (one_rod(drive="t", release="rod2.x > 1"), "there is no body 'rod2'; did you mean \"rod1\"?"),
     # loads
     (arm(load=[{"force": [1, 0, 0]}]), "load number 1: on: missing"),
     (arm(load=[{"on": "ground"}]), "which does not move"),
@@ -401,10 +419,10 @@ def test_an_end_beyond_what_numbers_hold_is_refused() -> None:
 )
 def test_slips_of_other_formats_get_the_way_out(changes: dict[str, Any], message: str) -> None:
     with pytest.raises(SceneError) as raised:
-        Scene(**one(**changes), constants={"speed": 3.0})
+        Scene(**one_rod(**changes), constants={"speed": 3.0})
     assert message in str(raised.value)
 
 
 def test_units_of_their_own_are_refused() -> None:
     with pytest.raises(SceneError, match="units: unknown key; scenes are in m, kg, s"):
-        Scene(**one(), units="mm")
+        Scene(**one_rod(), units="mm")

@@ -13,8 +13,8 @@ from mstmm.runtime.flexible.modal_body import ModalBody
 from tests.support.flexible.vibrations import (
     Array,
     frequencies,
-    held,
-    joined,
+    ground_hinge_equations,
+    hinge_equations,
     mass_matrix,
     port_rows,
 )
@@ -263,8 +263,8 @@ def test_frequencies_of_the_welded_frame_by_basis(
         ],
     )  # fmt: skip
     a, b = modal_bodies(scene).values()
-    equations = held((0, a.ports["root"], np.eye(3)), free=(5,))
-    equations += joined((0, a.ports["tip"], np.eye(3)), (1, b.ports["root"], QUARTER))
+    equations = ground_hinge_equations((0, a.ports["root"], np.eye(3)), free=(5,))
+    equations += hinge_equations((0, a.ports["tip"], np.eye(3)), (1, b.ports["root"], QUARTER))
     found = frequencies([a, b], [np.eye(3), QUARTER], equations, 3)
     error = np.abs(found / np.array([62.646, 270.33, 522.88]) - 1)
     assert (error <= 1.1 * np.array(errors) + 1e-5).all()
@@ -282,5 +282,7 @@ def test_auto_finds_the_textbook_frequencies(
 ) -> None:
     free = {"fixed": (), "pin": (5,), "free": range(6)}[hinge["type"]]
     body = body_of(hinge, modes={"y": 8}, quadrature=False)
-    found = frequencies([body], [np.eye(3)], held((0, body.ports["root"], np.eye(3)), free), 3)
+    found = frequencies(
+        [body], [np.eye(3)], ground_hinge_equations((0, body.ports["root"], np.eye(3)), free), 3
+    )
     assert found == pytest.approx(exact, rel=2e-3)

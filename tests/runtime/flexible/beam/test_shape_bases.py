@@ -12,7 +12,7 @@ from mstmm.runtime.flexible.beam.frame_conditions import modes_in_frame
 from mstmm.runtime.flexible.beam.frame_location import Frame
 from mstmm.runtime.flexible.beam.shape_functions import Piecewise
 from mstmm.runtime.flexible.modal_body import ModalBody
-from tests.support.flexible.vibrations import frequencies, held, joined
+from tests.support.flexible.vibrations import frequencies, ground_hinge_equations, hinge_equations
 from tests.support.scenes.single_beam import FREE, HELD, PIN, body_of
 
 PIECES = [(0.0, 0.3, 1.0, 1.0), (0.3, 0.8, 4.0, 0.25), (0.8, 1.1, 0.5, 2.0)]  # from, to, EI, m
@@ -88,13 +88,13 @@ def test_a_stepped_beam_vibrates_like_its_pieces_welded(basis: str) -> None:
                 basis="static+fixed-interface", polar_inertia_per_length=1e-9)
         for a, b, ei, m in PIECES
     ]  # fmt: skip
-    equations = held((0, parts[0].ports["root"], np.eye(3)))
+    equations = ground_hinge_equations((0, parts[0].ports["root"], np.eye(3)))
     for i in (0, 1):
-        equations += joined(
+        equations += hinge_equations(
             (i, parts[i].ports["tip"], np.eye(3)), (i + 1, parts[i + 1].ports["root"], np.eye(3))
         )
     reference = frequencies(parts, [np.eye(3)] * 3, equations, 3)
-    root = held((0, whole.ports["root"], np.eye(3)))
+    root = ground_hinge_equations((0, whole.ports["root"], np.eye(3)))
     found = frequencies([whole], [np.eye(3)], root, 3)
     assert found == pytest.approx(reference, rel=2e-3 if basis.startswith("static") else 2e-5)
 

@@ -51,7 +51,7 @@ def test_frequencies_of_the_cantilever() -> None:
 
 def test_reduction_error_against_the_whole_mesh() -> None:
     """Four fixed-interface modes: 2e-5 in the first frequency, 4e-3 in the fourth, from above."""
-    model, reduction = bar.model(), bar.reduced(0.3, 4)
+    model, reduction = bar.model(), bar.reduction(0.3, 4)
     held = reduction.sections.clamp([reduction.held_port])
     free = held.free
     stiffness = reduction.sections.stiffness.toarray()[np.ix_(free, free)]
@@ -78,7 +78,7 @@ def test_linear_elements_lock_and_say_so() -> None:
 @pytest.mark.parametrize("frame", ["tangent", "mean"])
 def test_static_shapes_are_exact(frame: str) -> None:
     """The compliance between the ends is the whole mesh's: K_reduced holds it without loss."""
-    reduction = bar.reduced(0.3, 0, frame)
+    reduction = bar.reduction(0.3, 0, frame)
     relative = reduction.motion(reduction.sections.ports[1])
     root = reduction.motion(reduction.held_port)
     turned = np.cross(root[3:].T, [bar.LENGTH, 0, 0]).T

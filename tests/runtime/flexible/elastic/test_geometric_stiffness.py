@@ -36,7 +36,7 @@ def test_unit_loads_of_the_clamped_bar() -> None:
 
 def test_shortening_follows_from_the_slope() -> None:
     """1/2 eta^2 g of the tip is how much nearer the ends are when the axis keeps its length."""
-    found = bar.reduced(0.0, 4)
+    found = bar.reduction(0.0, 4)
     nodes = found.sections.model.nodes
     axis = np.flatnonzero(np.hypot(nodes[:, 1], nodes[:, 2]) < 1e-12)
     axis = axis[np.argsort(nodes[axis, 0])]

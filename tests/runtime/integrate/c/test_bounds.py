@@ -15,7 +15,9 @@ STARTS, LONGEST = [0.0, 3.0, 3.5, 4.0, 8.0], [np.inf, 0.5, 0.01, 0.25, 2.0]
 @pytest.mark.parametrize("method", ["dopri5", "dop853", "pirk13"])
 def test_no_step_is_longer_than_its_bounds(lab: Lab, method: str) -> None:
     problem = lab.problem("harmonic", 2, 1e-3)
-    run = problem.solved(method, 20.0, (1.0, 0.0), bounds=(STARTS, LONGEST), rtol=1e-6, atol=1e-6)
+    run = problem.finished_run(
+        method, 20.0, (1.0, 0.0), bounds=(STARTS, LONGEST), rtol=1e-6, atol=1e-6
+    )
     t, ends = run.samples.t, [*STARTS[1:], np.inf]
     for begin, end, longest in zip(STARTS, ends, LONGEST, strict=True):
         touched = (t[1:] > begin * (1 + 1e-12)) & (t[:-1] < end)
@@ -27,7 +29,7 @@ def test_no_step_is_longer_than_its_bounds(lab: Lab, method: str) -> None:
 def test_a_tighter_max_step_goes_before(lab: Lab) -> None:
     problem = lab.problem("harmonic", 2, 1e-3)
     options = {"bounds": (STARTS, LONGEST), "max_step": 0.1, "rtol": 1e-6, "atol": 1e-6}
-    run = problem.solved("dop853", 20.0, (1.0, 0.0), **options)
+    run = problem.finished_run("dop853", 20.0, (1.0, 0.0), **options)
     assert 0.099 < np.diff(run.samples.t).max() <= 0.1 * (1 + 1e-12)
 
 
@@ -35,7 +37,7 @@ def test_bounds_do_not_depend_on_how_a_run_is_cut(lab: Lab) -> None:
     def options() -> dict[str, object]:
         return {"bounds": (STARTS, LONGEST), "rtol": 1e-6, "atol": 1e-6}
 
-    wanted = lab.problem("harmonic", 2, 1e-3).solved("dop853", 20.0, (1.0, 0.0), **options())
+    wanted = lab.problem("harmonic", 2, 1e-3).finished_run("dop853", 20.0, (1.0, 0.0), **options())
     run = lab.problem("harmonic", 2, 1e-3).run("dop853", 20.0, (1.0, 0.0), **options())
     while run.advance(0.0) is Status.RUNNING:
         run.restore(run.state())

@@ -33,7 +33,7 @@ def event_samples(run: Integrator) -> tuple[list[int], Any]:
 @pytest.mark.parametrize("method", ["dopri5", "dop853"])
 def test_event_times_are_exact_to_the_tolerance_of_the_run(lab: Lab, method: str) -> None:
     problem = rotation(lab, RESTART, y1=0.5)
-    run = problem.solved(method, 20.0, (1, 0), rtol=1e-13, atol=1e-14)
+    run = problem.finished_run(method, 20.0, (1, 0), rtol=1e-13, atol=1e-14)
     exact = [(2 * k + 1) * math.pi + math.asin(0.5) for k in range(3)]
     numbers, times = event_samples(run)
     assert numbers == [0, 0, 0]
@@ -55,7 +55,7 @@ def test_events_are_located_to_rounding_on_the_dense_output(lab: Lab) -> None:
 def test_a_falling_body_bounces_when_it_should(lab: Lab) -> None:
     problem = lab.problem("falling", 2, 0.5)
     lab.lib.test_use_bounce(problem.system, problem.at)
-    run = problem.solved("dopri5", 1.3, (1.0, 0.0), rtol=1e-12, atol=1e-14)
+    run = problem.finished_run("dopri5", 1.3, (1.0, 0.0), rtol=1e-12, atol=1e-14)
     fall = math.sqrt(2.0 / 9.81)
     exact = [fall * (1 + 2 * sum(0.5**j for j in range(1, k + 1))) for k in range(8)]
     exact = [t for t in exact if t < 1.3]
@@ -75,7 +75,7 @@ def test_ever_smaller_bounces_are_followed_far(lab: Lab) -> None:
     fall = math.sqrt(2.0 / 9.81)
     lengths = 2 * fall * 0.7 ** np.arange(1, 41)
     t_end = fall + lengths.sum() + 0.5 * lengths[-1] * 0.7
-    run = problem.solved("dop853", t_end, (1.0, 0.0), rtol=1e-10, atol=1e-13)
+    run = problem.finished_run("dop853", t_end, (1.0, 0.0), rtol=1e-10, atol=1e-13)
     assert problem.at.memory[0] == 41.0
     assert run.y[0] > -1e-12
 
@@ -88,7 +88,7 @@ def test_several_events_in_one_step_fire_in_time_order(lab: Lab) -> None:
     assert problem.at.calls == 123
     assert run.statistics.steps == 1
     problem = rotation(lab, CONTINUE, y1=0.9, t=4.1, y0=0.1)
-    problem.solved("dop853", 5.0, (math.cos(4), -math.sin(4)), t_start=4.0, step=1.0)
+    problem.finished_run("dop853", 5.0, (math.cos(4), -math.sin(4)), t_start=4.0, step=1.0)
     assert problem.at.calls == 213
 
 
@@ -97,7 +97,7 @@ def test_simultaneous_events_all_fire(lab: Lab) -> None:
     at = 5.0 * math.pi / 4.0
     for answer in (RESTART, CONTINUE, IGNORE):
         problem = rotation(lab, answer, y1=math.sqrt(0.5), t=at)
-        run = problem.solved("dop853", 4.2, (1, 0), rtol=1e-13, atol=1e-15)
+        run = problem.finished_run("dop853", 4.2, (1, 0), rtol=1e-13, atol=1e-15)
         assert sorted(str(problem.at.calls)) == ["1", "2"]
         assert run.statistics.events == 2
     # and exactly: three conditions on the clock alone, in their order
@@ -105,7 +105,7 @@ def test_simultaneous_events_all_fire(lab: Lab) -> None:
     clocks = problem.system.events = lab.ffi.callback(
         "int(void *, double, const double *, double *)", three_clocks
     )
-    run = problem.solved("dopri5", 2.0, (1, 0), rtol=1e-6)
+    run = problem.finished_run("dopri5", 2.0, (1, 0), rtol=1e-6)
     del clocks
     assert problem.at.calls == 123
     assert list(run.samples.event[run.samples.event != 0]) == [-1, 1, 2, 3]
@@ -119,7 +119,7 @@ def three_clocks(context: Any, t: float, y: Any, g: Any) -> int:
 
 def test_an_event_true_at_the_start_fires_there_once(lab: Lab) -> None:
     problem = rotation(lab, RESTART, y0=0.5)
-    run = problem.solved("dopri5", 2.0, (1, 0), rtol=1e-9)
+    run = problem.finished_run("dopri5", 2.0, (1, 0), rtol=1e-9)
     assert problem.at.calls == 3
     assert list(run.samples.event[:3]) == [0, 3, 0]
     assert list(run.samples.t[:2]) == [0.0, 0.0]
@@ -134,12 +134,12 @@ def test_answers_of_fire(lab: Lab) -> None:
     # y1 = -sin t is above 0.5 three times until t = 20
     for answer, count in ((IGNORE, 1), (RESTART, 3), (CONTINUE, 3)):
         problem = rotation(lab, answer, y1=0.5)
-        run = problem.solved("dop853", 20.0, (1, 0), rtol=1e-9)
+        run = problem.finished_run("dop853", 20.0, (1, 0), rtol=1e-9)
         assert run.statistics.events == count
         changed = answer == RESTART
         assert np.count_nonzero(run.samples.event) == (2 * count if changed else 0)
-    plain = rotation(lab, IGNORE).solved("dop853", 20.0, (1, 0), rtol=1e-9)
-    watched = rotation(lab, CONTINUE, y1=0.5).solved("dop853", 20.0, (1, 0), rtol=1e-9)
+    plain = rotation(lab, IGNORE).finished_run("dop853", 20.0, (1, 0), rtol=1e-9)
+    watched = rotation(lab, CONTINUE, y1=0.5).finished_run("dop853", 20.0, (1, 0), rtol=1e-9)
     assert np.array_equal(plain.samples.y, watched.samples.y)  # a mere look changes no step
 
 
@@ -147,19 +147,19 @@ def test_an_ignored_event_leaves_memory_alone(lab: Lab) -> None:
     problem = lab.problem("falling", 2, 0.5, 0.0)
     lab.lib.test_use_bounce(problem.system, problem.at)
     problem.at.p[1] = CONTINUE
-    problem.solved("dopri5", 0.5, (1.0, 0.0), rtol=1e-9)
+    problem.finished_run("dopri5", 0.5, (1.0, 0.0), rtol=1e-9)
     assert problem.at.memory[0] == 0.0
 
 
 def test_a_short_true_interval_within_a_step_is_found(lab: Lab) -> None:
     # y0 = cos t exceeds 1 - 1e-4 for 0.028 s around each turn; steps are up to 0.8 s long
     problem = rotation(lab, CONTINUE, y0=1 - 1e-4)
-    run = problem.solved("dop853", 63.0, (0, -1), t_start=math.pi / 2, rtol=1e-7, atol=1e-9)
+    run = problem.finished_run("dop853", 63.0, (0, -1), t_start=math.pi / 2, rtol=1e-7, atol=1e-9)
     assert run.statistics.largest_step is not None
     assert run.statistics.largest_step > 0.7
     assert problem.at.calls == int("3" * 10)
     problem = rotation(lab, RESTART, y0=1 - 1e-4)
-    run = problem.solved("dop853", 63.0, (0, -1), t_start=math.pi / 2, rtol=1e-12, atol=1e-12)
+    run = problem.finished_run("dop853", 63.0, (0, -1), t_start=math.pi / 2, rtol=1e-12, atol=1e-12)
     exact = 2 * math.pi * np.arange(1, 11) - math.acos(1 - 1e-4)
     assert event_samples(run)[1] == pytest.approx(exact, abs=1e-8)
 
@@ -167,7 +167,7 @@ def test_a_short_true_interval_within_a_step_is_found(lab: Lab) -> None:
 def test_a_clock_event_at_a_break_fires_exactly_there(lab: Lab) -> None:
     for options in ({"step": 0.3}, {"rtol": 1e-6}):
         problem = rotation(lab, RESTART, t=1.0)
-        run = problem.solved("dop853", 2.0, (1, 0), breaks=[1.0], **options)
+        run = problem.finished_run("dop853", 2.0, (1, 0), breaks=[1.0], **options)
         assert list(run.samples.t[run.samples.event != 0]) == [1.0, 1.0]
         assert problem.at.calls == 2
 
@@ -175,7 +175,7 @@ def test_a_clock_event_at_a_break_fires_exactly_there(lab: Lab) -> None:
 def test_events_and_output_times_together(lab: Lab) -> None:
     times = np.linspace(0.0, 5.0, 51)
     problem = rotation(lab, RESTART, y1=0.5)
-    run = problem.solved("dop853", 5.0, (1, 0), rtol=1e-11, atol=1e-12, output_times=times)
+    run = problem.finished_run("dop853", 5.0, (1, 0), rtol=1e-11, atol=1e-12, output_times=times)
     regular = run.samples.event == 0
     assert np.array_equal(run.samples.t[regular], times)
     assert np.all(np.diff(run.samples.t) >= 0.0)
@@ -187,14 +187,14 @@ def test_output_times_are_all_there_where_events_coincide(lab: Lab) -> None:
     # events at the start, at an output time, at a break and at the end
     for answer in (RESTART, CONTINUE):
         problem = rotation(lab, answer, t=1.5, y0=0.99)
-        run = problem.solved(
+        run = problem.finished_run(
             "dop853", 2.0, (1, 0), output_times=[0.0, 1.0, 1.5, 2.0], breaks=[1.5], rtol=1e-9
         )
         regular = run.samples.event == 0
         assert run.samples.t[regular].tolist() == [0.0, 1.0, 1.5, 2.0]
         assert problem.at.calls == 32
     problem = rotation(lab, RESTART, t=2.0)
-    run = problem.solved("dop853", 2.0, (1, 0), output_times=[2.0], rtol=1e-9)
+    run = problem.finished_run("dop853", 2.0, (1, 0), output_times=[2.0], rtol=1e-9)
     assert run.samples.event.tolist() == [0, -2, 2]
     assert run.samples.t.tolist() == [2.0, 2.0, 2.0]
 

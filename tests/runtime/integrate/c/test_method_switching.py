@@ -43,7 +43,7 @@ def step_by_step(run: Integrator, methods: list[str]) -> None:
 @pytest.mark.parametrize("case", OUTPUTS)
 def test_the_same_method_again_changes_nothing(lab: Lab, case: str) -> None:
     options = OUTPUTS[case]
-    wanted = bouncing(lab).solved("dop853", 1.2, START, **options)
+    wanted = bouncing(lab).finished_run("dop853", 1.2, START, **options)
     run = bouncing(lab).run("dop853", 1.2, START, **options)
     step_by_step(run, ["dop853"])
     assert equal(run.samples, wanted.samples)
@@ -55,7 +55,7 @@ def test_the_same_method_again_changes_nothing(lab: Lab, case: str) -> None:
 def test_methods_in_turn_keep_events_outputs_and_breaks(lab: Lab, case: str) -> None:
     """A body falls on exact parabolas between bounces, whoever makes the steps."""
     options = OUTPUTS[case] | {"rtol": 1e-9, "atol": 1e-11}
-    wanted = bouncing(lab).solved("dop853", 1.2, START, **options)
+    wanted = bouncing(lab).finished_run("dop853", 1.2, START, **options)
     run = bouncing(lab).run("dop853", 1.2, START, **options)
     step_by_step(run, ["rodas5p", "dop853", "esdirk436", "dopri5"])
     assert run.status is Status.FINISHED
@@ -143,7 +143,7 @@ def test_a_run_without_a_next_step_goes_on_by_another_method(lab: Lab) -> None:
     run.switch_method(get("dop853"))
     assert run.status is Status.RUNNING and not run.no_step and run.t == failed_at
     assert run.advance(60.0) is Status.FINISHED
-    wanted = lab.mechanism("pendulum", 20.0, 0.5).solved(
+    wanted = lab.mechanism("pendulum", 20.0, 0.5).finished_run(
         "dop853", 1.5, start, rtol=1e-11, atol=1e-13
     )
     assert run.y == pytest.approx(wanted.y, abs=1e-6)

@@ -80,7 +80,7 @@ def test_a_lane_makes_the_steps_of_a_run_alone(lab: Lab, case: str, lanes: int) 
     batch = side_by_side(problem, lanes, y0=y0, t_end=2.0, **options)
     lab.lib.test_use_lanes(problem.system, problem.at, 0)
     for i, start in enumerate(y0):
-        alone = problem.solved(
+        alone = problem.finished_run(
             t_end=2.0, y0=start, rtol=1e-9, atol=1e-9, output_times=TIMES, **options
         )
         assert same_bits(batch.samples[i], alone.samples.y)

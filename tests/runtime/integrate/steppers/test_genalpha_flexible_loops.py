@@ -10,7 +10,7 @@ import pytest
 import mstmm
 from mstmm.array_validation import Array
 from tests.system.loops.test_flexible_against_tree import SCENES
-from tests.system.loops.test_flexible_constraints import ROWS, bladed
+from tests.system.loops.test_flexible_constraints import ROWS, blade_model
 
 #: Mass per length, length and bending stiffness of a beam; gravity so weak that its end stays.
 HEAVY, LENGTH, STIFF, WEIGHT = 1.5, 1.2, 40.0, 0.01
@@ -38,7 +38,7 @@ def test_order_and_no_gap(name: str, method: str) -> None:
 @pytest.mark.parametrize("name", ROWS)
 def test_constraints_and_couplings(name: str) -> None:
     closing, ring, _ = ROWS[name]
-    model = bladed(ring, **closing)
+    model = blade_model(ring, **closing)
     coarse, fine = (errors(model, "genalpha-index3", 0.2, steps) for steps in (400, 800))
     print(name, coarse, fine, np.log2(coarse / fine))
     assert np.abs(np.log2(coarse / fine) - 2).max() < 0.1 and fine[0] < 1e-4

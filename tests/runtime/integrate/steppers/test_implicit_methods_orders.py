@@ -41,9 +41,9 @@ def steps_for(order: int) -> tuple[float, float]:
 def test_fixed_steps_show_the_order(lab: Lab, method: str, name: str) -> None:
     problem, start = mechanism(lab, name)
     n = problem.system.implicit.n_q + problem.system.implicit.n_u
-    exact = problem.solved("dop853", 1.0, start, rtol=1e-13, atol=1e-14).y[:n]
+    exact = problem.finished_run("dop853", 1.0, start, rtol=1e-13, atol=1e-14).y[:n]
     errors = [
-        np.abs(problem.solved(method, 1.0, start, step=h, **TIGHT).y[:n] - exact).max()
+        np.abs(problem.finished_run(method, 1.0, start, step=h, **TIGHT).y[:n] - exact).max()
         for h in steps_for(get(method).order)
     ]
     assert math.log2(errors[0] / errors[1]) > get(method).order - 0.3, errors
@@ -59,9 +59,11 @@ def work_order(lab: Lab, method: str, name: str) -> float:
     """Order of the largest error at the ends of steps: at one time errors may happen to vanish."""
     problem, start = mechanism(lab, name)
     t = {"output_times": np.linspace(0.0, 1.0, 17)}
-    exact = problem.solved("dop853", 1.0, start, rtol=1e-13, atol=1e-14, **t).samples.y[:, -1]
+    exact = problem.finished_run("dop853", 1.0, start, rtol=1e-13, atol=1e-14, **t).samples.y[:, -1]
     errors = [
-        np.abs(problem.solved(method, 1.0, start, step=h, **t, **TIGHT).samples.y[:, -1] - exact)
+        np.abs(
+            problem.finished_run(method, 1.0, start, step=h, **t, **TIGHT).samples.y[:, -1] - exact
+        )
         for h in steps_for(get(method).order)
     ]
     return math.log2(errors[0].max() / errors[1].max())
@@ -73,8 +75,8 @@ def test_dense_output_shows_its_order_within_a_step(lab: Lab, method: str) -> No
     errors = []
     for h in (0.1, 0.05) if get(method).order > 2 else (0.02, 0.01):
         t = h * np.linspace(0.1, 0.9, 9)
-        run = problem.solved(method, h, start, step=h, output_times=t, **TIGHT)
-        exact = problem.solved("dop853", h, start, rtol=1e-13, atol=1e-14, output_times=t)
+        run = problem.finished_run(method, h, start, step=h, output_times=t, **TIGHT)
+        exact = problem.finished_run("dop853", h, start, rtol=1e-13, atol=1e-14, output_times=t)
         errors.append(np.abs(run.samples.y[:, :4] - exact.samples.y[:, :4]).max())
     wanted = min(get(method).order, get(method).dense_order) + 1
     assert math.log2(errors[0] / errors[1]) > wanted - 0.45, errors
@@ -84,7 +86,9 @@ def test_drives_hold_inside_steps(lab: Lab) -> None:
     problem, start = mechanism(lab, "slide")
     t = np.linspace(0.0, 1.0, 37)
     for method in ("rodas4p2", "esdirk436", "genalpha"):
-        found = problem.solved(method, 1.0, start, step=0.2, output_times=t, **TIGHT).samples.y
+        found = problem.finished_run(
+            method, 1.0, start, step=0.2, output_times=t, **TIGHT
+        ).samples.y
         assert found[:, 0] == pytest.approx(0.3 * np.sin(3 * t), abs=1e-15)
         assert found[:, 2] == pytest.approx(0.9 * np.cos(3 * t), abs=1e-15)
 
@@ -107,7 +111,7 @@ def test_stiff_prescribed_motion(lab: Lab, method: str, largest: float, order: f
     problem, (a, b) = moving_base(lab, 1e8)
     exact = a * math.sin(2.0) + b * math.cos(2.0)
     errors = [
-        abs(problem.solved(method, 2.0, (b, a), step=h, rtol=1e-12, atol=1e-14).y[0] - exact)
+        abs(problem.finished_run(method, 2.0, (b, a), step=h, rtol=1e-12, atol=1e-14).y[0] - exact)
         for h in (1 / 20, 1 / 80)
     ]
     assert errors[0] < largest
@@ -117,7 +121,7 @@ def test_stiff_prescribed_motion(lab: Lab, method: str, largest: float, order: f
 def test_stiff_rotations_keep_their_length(lab: Lab) -> None:
     problem, start = mechanism(lab, "ball")
     for method in ("rodas5p", "kvaerno5", "genalpha"):
-        y = problem.solved(method, 5.0, start, step=1 / 50).y
+        y = problem.finished_run(method, 5.0, start, step=1 / 50).y
         assert np.linalg.norm(y[:4]) == pytest.approx(1.0, abs=1e-15)
 
 
@@ -126,7 +130,7 @@ def test_without_its_tangent_the_method_is_explicit_in_name_only(lab: Lab) -> No
     problem = lab.mechanism("chain", 1e10, 2e3, 1.0, 2.0)
     start = np.zeros(7)
     for method in IMPLICIT:
-        y = problem.solved(method, 1.0, start, step=0.01).y
+        y = problem.finished_run(method, 1.0, start, step=0.01).y
         static = 1e-10 * math.cos(2.0) * np.array([1, 2, 3])
         assert y[:3] == pytest.approx(static, abs=2e-10), method
 
@@ -143,7 +147,9 @@ def test_a_break_keeps_the_order(lab: Lab, method: str, at: float) -> None:
     order = get(method).order
     steps = (1 / 8, 1 / 16) if order > 3 else (1 / 40, 1 / 80)
     errors = [
-        np.abs(problem.solved(method, t_end, (0, 0), step=h, breaks=[at], **TIGHT).y - exact).max()
+        np.abs(
+            problem.finished_run(method, t_end, (0, 0), step=h, breaks=[at], **TIGHT).y - exact
+        ).max()
         for h in steps
     ]
     if method in BEHIND:
@@ -155,10 +161,10 @@ def test_a_break_keeps_the_order(lab: Lab, method: str, at: float) -> None:
 @pytest.mark.parametrize("method", [m for m in IMPLICIT if get(m).adaptive])
 def test_the_order_survives_changes_of_the_step(lab: Lab, method: str) -> None:
     problem, start = mechanism(lab, "pendulum")
-    exact = problem.solved("dop853", 2.0, start, rtol=1e-13, atol=1e-14).y[:4]
+    exact = problem.finished_run("dop853", 2.0, start, rtol=1e-13, atol=1e-14).y[:4]
     tolerances, errors, steps = (1e-5, 1e-7), [], []
     for tolerance in tolerances:
-        run = problem.solved(method, 2.0, start, rtol=tolerance, atol=1e-2 * tolerance)
+        run = problem.finished_run(method, 2.0, start, rtol=tolerance, atol=1e-2 * tolerance)
         errors.append(np.abs(run.y[:4] - exact).max())
         steps.append(run.statistics.steps)
     found = math.log(errors[0] / errors[1]) / math.log(steps[1] / steps[0])

@@ -61,7 +61,7 @@ def equal(a: Samples, b: Samples) -> bool:
 def test_a_run_continues_bit_for_bit_from_every_step(lab: Lab, case: str, system: str) -> None:
     make, start = SYSTEMS[system]
     method, options = CASES[case]
-    whole = make(lab).solved(method, 1.5, start, **options)
+    whole = make(lab).finished_run(method, 1.5, start, **options)
     assert whole.samples.event.any() == (system == "bouncing")
     parts, steps = [], 0
     run = make(lab).run(method, 1.5, start, **options)
@@ -80,7 +80,7 @@ def test_a_run_continues_bit_for_bit_from_every_step(lab: Lab, case: str, system
 @pytest.mark.parametrize("case", CASES)
 def test_slices_and_small_buffers_change_nothing(lab: Lab, case: str) -> None:
     method, options = CASES[case]
-    whole = bouncing(lab).solved(method, 1.5, (1.0, 0.0), **options)
+    whole = bouncing(lab).finished_run(method, 1.5, (1.0, 0.0), **options)
     run = bouncing(lab).run(method, 1.5, (1.0, 0.0), capacity=2, **options)
     while run.advance(0.0) is Status.RUNNING:
         pass
@@ -93,7 +93,7 @@ def test_a_run_continues_bit_for_bit_from_within_a_step(lab: Lab, case: str) -> 
     method, options = CASES[case]
     options = options | {"output_times": np.linspace(0, 0.3, 181)}  # several in a step
     start = (0.0, 0.4, 0, 0, 0)
-    whole = hanging(lab).solved(method, 0.3, start, **options)
+    whole = hanging(lab).finished_run(method, 0.3, start, **options)
     parts, inside, before = [], 0, -1
     run = hanging(lab).run(method, 0.3, start, capacity=2, **options)
     while run.advance(0.0) is Status.RUNNING:
@@ -113,7 +113,7 @@ def test_a_falling_body_bounces_when_it_should(lab: Lab, method: str) -> None:
     options: dict[str, Any] = {"rtol": 1e-9, "atol": 1e-10} if method in ADAPTIVE else {}
     if method not in ADAPTIVE or get(method).order == 2:
         options = {"step": 1e-3}
-    run = bouncing(lab).solved(method, 1.3, (1.0, 0.0), **options)
+    run = bouncing(lab).finished_run(method, 1.3, (1.0, 0.0), **options)
     fall = math.sqrt(2.0 / 9.81)
     exact = [fall * (1 + 2 * sum(0.5**j for j in range(1, k + 1))) for k in range(8)]
     exact = [t for t in exact if t < 1.3]
@@ -136,7 +136,7 @@ def test_a_stop_gives_back_no_more_than_it_took(lab: Lab, method: str, hw: float
     for phase in np.linspace(0.05, 0.95, 10):
         problem = lab.mechanism("stop", k)
         lab.lib.test_use_event(problem.system, b"gap")
-        run = problem.solved(method, 20 * h, ((5.0 + phase) * h, -1.0), step=h)
+        run = problem.finished_run(method, 20 * h, ((5.0 + phase) * h, -1.0), step=h)
         assert run.statistics.switch_crossings == 2
         rebounds.append(run.y[1])
     assert max(rebounds) < 1.05
@@ -148,7 +148,7 @@ def test_a_stop_is_met_to_the_tolerance(lab: Lab, method: str) -> None:
     problem = lab.mechanism("stop", 1e4)
     lab.lib.test_use_event(problem.system, b"gap")
     tolerance = 1e-6 if get(method).order > 2 else 1e-5
-    run = problem.solved(method, 0.3, (0.1, -1.0), rtol=tolerance, atol=1e-2 * tolerance)
+    run = problem.finished_run(method, 0.3, (0.1, -1.0), rtol=tolerance, atol=1e-2 * tolerance)
     # 0.1 s of approach, pi / 100 s of contact
     assert run.y == pytest.approx([0.2 - math.pi / 100, 1.0], abs=2e-3)
 
@@ -157,10 +157,10 @@ def test_a_stop_is_met_to_the_tolerance(lab: Lab, method: str) -> None:
 def test_achieved_errors_follow_the_tolerance(lab: Lab, method: str) -> None:
     problem = hanging(lab)
     start, t_end = (0.0, 0.0, 0, 0, 0), 1.0
-    exact = problem.solved("dop853", t_end, start, rtol=1e-11, atol=1e-12).y[:2]
+    exact = problem.finished_run("dop853", t_end, start, rtol=1e-11, atol=1e-12).y[:2]
     errors = []
     for tolerance in (1e-3, 1e-5):
-        run = problem.solved(method, t_end, start, rtol=tolerance, atol=1e-2 * tolerance)
+        run = problem.finished_run(method, t_end, start, rtol=tolerance, atol=1e-2 * tolerance)
         errors.append(float(np.abs(run.y[:2] - exact).max()))
         assert errors[-1] < (10 if get(method).order > 2 else 100) * tolerance
     assert errors[1] < errors[0]
@@ -169,10 +169,10 @@ def test_achieved_errors_follow_the_tolerance(lab: Lab, method: str) -> None:
 def test_the_vibration_of_a_slack_stiff_spring_costs_nothing(lab: Lab) -> None:
     # the joint vibrates at 4e3 rad/s; explicit steps must resolve it
     problem, start = lab.mechanism("pendulum", 1e6, 50.0), (0.0, 0.0, 0, 0, 0)
-    explicit = problem.solved("dop853", 1.0, start, rtol=1e-4, atol=1e-6)
-    reference = problem.solved("dop853", 1.0, start, rtol=1e-10, atol=1e-12)
+    explicit = problem.finished_run("dop853", 1.0, start, rtol=1e-4, atol=1e-6)
+    reference = problem.finished_run("dop853", 1.0, start, rtol=1e-10, atol=1e-12)
     for method in ("rodas4p2", "rodas5p", "esdirk436", "genalpha"):
-        run = problem.solved(method, 1.0, start, rtol=1e-4, atol=1e-6)
+        run = problem.finished_run(method, 1.0, start, rtol=1e-4, atol=1e-6)
         assert run.statistics.steps < 0.1 * explicit.statistics.steps, method
         assert np.abs(run.y[:2] - reference.y[:2]).max() < 3e-3
 
@@ -180,7 +180,7 @@ def test_the_vibration_of_a_slack_stiff_spring_costs_nothing(lab: Lab) -> None:
 def test_counts_are_those_of_the_method(lab: Lab) -> None:
     problem, start = hanging(lab), (0.0, 0.4, 0, 0, 0)
     problem.system.n_error = 4  # the work is not asked
-    run = problem.solved("rodas4p2", 1.0, start, rtol=1e-5)
+    run = problem.finished_run("rodas4p2", 1.0, start, rtol=1e-5)
     s = run.statistics
     tries = s.steps + s.rejected_steps
     assert (s.tangents, s.iterations) == (tries, 0)
@@ -194,21 +194,21 @@ def test_counts_are_those_of_the_method(lab: Lab) -> None:
     assert tries <= carried + evaluated < 2 * tries
     assert 0 <= s.solves - tries - 5 * (carried + evaluated) <= carried
     assert s.sum_of_local_errors is not None
-    s = problem.solved("dttmm", 1.0, start, step=0.01).statistics
+    s = problem.finished_run("dttmm", 1.0, start, step=0.01).statistics
     assert (s.tangents, s.solves, s.iterations, s.rejected_steps) == (100, 100, 100, 0)
-    s = problem.solved("genalpha", 1.0, start, step=0.01).statistics
+    s = problem.finished_run("genalpha", 1.0, start, step=0.01).statistics
     assert s.solves == s.iterations
     assert s.tangents < 0.5 * s.steps
     assert 100 < s.iterations < 500
-    assert problem.solved("dop853", 1.0, start).statistics.residuals == 0
+    assert problem.finished_run("dop853", 1.0, start).statistics.residuals == 0
 
 
 def test_fixed_steps_iterate_no_more_than_they_are_worth(lab: Lab) -> None:
     problem, start = lab.mechanism("pendulum", 3.0, 0.3), (-0.3, 0.1, 0, 0, 0)
-    exact = problem.solved("dop853", 1.0, start, rtol=1e-11, atol=1e-12).y[:2]
+    exact = problem.finished_run("dop853", 1.0, start, rtol=1e-11, atol=1e-12).y[:2]
     found = []
     for method in ("genalpha", "dttmm"):
-        run = problem.solved(method, 1.0, start, step=0.005, rtol=1e-9, atol=1e-12)
+        run = problem.finished_run(method, 1.0, start, step=0.005, rtol=1e-9, atol=1e-12)
         found.append((np.abs(run.y[:2] - exact).max(), run.statistics))
     (iterated, many), (once, one) = found
     assert many.iterations < 2.5 * many.steps
@@ -219,11 +219,11 @@ def test_fixed_steps_iterate_no_more_than_they_are_worth(lab: Lab) -> None:
 def test_a_state_that_accept_changes_starts_afresh(lab: Lab) -> None:
     start = (-0.3, 0.1, 0, 0, 0)
     for method in ("rodas4p2", "esdirk436", "newmark"):
-        kept = lab.mechanism("pendulum", 3.0, 0.3).solved(method, 1.0, start, step=0.01)
+        kept = lab.mechanism("pendulum", 3.0, 0.3).finished_run(method, 1.0, start, step=0.01)
         problem = lab.mechanism("pendulum", 3.0, 0.3)
         lab.lib.test_use_accept(problem.system, problem.at)
         problem.at.p[7] = -1.0  # accept says that the first stage is invalid
-        fresh = problem.solved(method, 1.0, start, step=0.01)
+        fresh = problem.finished_run(method, 1.0, start, step=0.01)
         again = fresh.statistics.evaluations - kept.statistics.evaluations
         assert again == fresh.statistics.steps - 1
         assert fresh.y == pytest.approx(kept.y, abs=1e-5)
@@ -237,7 +237,7 @@ def test_work_steers_the_step_where_nothing_else_does(lab: Lab, method: str) -> 
     errors = []
     for n_error in (2, 3):
         problem.system.n_error = n_error
-        run = problem.solved(method, 2.0, (0, 3, 0), rtol=tolerance, atol=tolerance)
+        run = problem.finished_run(method, 2.0, (0, 3, 0), rtol=tolerance, atol=tolerance)
         errors.append(abs(run.y[2] - 4.5 * (math.cos(6.0) ** 2 - 1.0)))
     assert errors[1] < 200 * tolerance
     assert errors[1] < 0.5 * errors[0]
@@ -247,7 +247,7 @@ def test_a_tangent_that_does_not_change_is_made_once(lab: Lab) -> None:
     # Newton's iteration on linear equations with steps of one length
     problem = lab.mechanism("chain", 100.0, 1.0, 1.0, 2.0)
     for method in ("genalpha", "newmark", "esdirk436", "kvaerno5"):
-        assert problem.solved(method, 1.0, np.zeros(7), step=0.01).statistics.tangents == 1
+        assert problem.finished_run(method, 1.0, np.zeros(7), step=0.01).statistics.tangents == 1
 
 
 @pytest.mark.parametrize("method", ["rodas4p2", "esdirk436", "genalpha", "dttmm"])
@@ -282,14 +282,14 @@ def test_what_does_not_converge_says_so(lab: Lab) -> None:
     shorter = problem.run("genalpha", 2.0, (0.0, 0.1), rtol=1e-3, atol=1e-5)
     assert shorter.advance(60.0) is Status.FINISHED, shorter.message()
     assert shorter.statistics.rejected_steps > 0
-    rosenbrock = problem.solved("rodas4p2", 2.0, (0.0, 0.1), rtol=1e-4, atol=1e-6)
+    rosenbrock = problem.finished_run("rodas4p2", 2.0, (0.0, 0.1), rtol=1e-4, atol=1e-6)
     assert shorter.y[0] == pytest.approx(rosenbrock.y[0], abs=3e-3)
 
 
 def test_unstable_positions_are_left_as_they_should(lab: Lab) -> None:
     # q'' = 4 q: h lambda is small, and the motion grows as cosh 2 t
     for method in IMPLICIT:
-        y = lab.mechanism("inverted", 2.0).solved(method, 1.0, (0.1, 0.0), step=1e-3).y
+        y = lab.mechanism("inverted", 2.0).finished_run(method, 1.0, (0.1, 0.0), step=1e-3).y
         assert y[0] == pytest.approx(0.1 * math.cosh(2.0), rel=1e-4), method
 
 

@@ -18,7 +18,9 @@ START = (1.0, 1.0)
 def runs(lab: Lab, tableau: Tableau, lanes: int) -> Integrator:
     problem = lab.problem("mixed", 2)
     lab.lib.test_use_lanes(problem.system, problem.at, lanes)
-    return problem.solved(tableau, 3.0, START, rtol=1e-9, atol=1e-11, output_times=[0.7, 1.9, 3.0])
+    return problem.finished_run(
+        tableau, 3.0, START, rtol=1e-9, atol=1e-11, output_times=[0.7, 1.9, 3.0]
+    )
 
 
 def test_side_by_side_is_one_after_the_other(lab: Lab) -> None:

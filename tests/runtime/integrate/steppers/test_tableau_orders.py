@@ -40,7 +40,9 @@ def observed_order(errors: list[float], ratio: float = 2.0) -> float:
 def test_fixed_steps_show_the_order(lab: Lab, method: str) -> None:
     problem = lab.problem("mixed", 2)
     errors = [
-        float(np.abs(problem.solved(method, 2.0, (1, 1), step=h).y - mixed_solution(2.0)).max())
+        float(
+            np.abs(problem.finished_run(method, 2.0, (1, 1), step=h).y - mixed_solution(2.0)).max()
+        )
         for h in STEPS[method]
     ]
     *_, before, last = STEPS[method]
@@ -55,7 +57,7 @@ def test_dense_output_shows_its_order_within_a_step(lab: Lab, method: str) -> No
     errors = []
     for h in (0.4, 0.2) if method == "pirk13" else (0.4, 0.2, 0.1):
         t = 0.3 + h * np.linspace(0.1, 0.9, 9)
-        run = problem.solved(
+        run = problem.finished_run(
             method, 0.3 + h, mixed_solution(0.3), t_start=0.3, step=h, output_times=t, capacity=3
         )
         assert np.array_equal(run.samples.t, t)
@@ -65,7 +67,7 @@ def test_dense_output_shows_its_order_within_a_step(lab: Lab, method: str) -> No
 
 @pytest.mark.parametrize("tolerance", [1e-6, 1e-9, 1e-12])
 def test_dop853_takes_scipys_steps(lab: Lab, tolerance: float) -> None:
-    run = lab.problem("arenstorf", 4).solved(
+    run = lab.problem("arenstorf", 4).finished_run(
         "dop853", PERIOD, ARENSTORF, rtol=tolerance, atol=tolerance
     )
     theirs = solve_ivp(
@@ -80,7 +82,7 @@ def test_dop853_takes_scipys_steps(lab: Lab, tolerance: float) -> None:
 
 @pytest.mark.parametrize("tolerance", [1e-6, 1e-9])
 def test_dopri5_costs_no_more_than_scipys(lab: Lab, tolerance: float) -> None:
-    run = lab.problem("arenstorf", 4).solved(
+    run = lab.problem("arenstorf", 4).finished_run(
         "dopri5", PERIOD, ARENSTORF, rtol=tolerance, atol=tolerance
     )
     theirs = solve_ivp(
@@ -93,7 +95,7 @@ def test_dopri5_costs_no_more_than_scipys(lab: Lab, tolerance: float) -> None:
 
 def test_dopri5_saves_evaluations_where_stability_limits(lab: Lab) -> None:
     problem = lab.problem("harmonic", 2, 300.0, 1.0)
-    run = problem.solved("dopri5", 5.0, (1, 0), rtol=1e-6, atol=1e-6)
+    run = problem.finished_run("dopri5", 5.0, (1, 0), rtol=1e-6, atol=1e-6)
     theirs = solve_ivp(
         lambda t, y: [y[1], -9e4 * y[0] - 600.0 * y[1]], (0, 5), (1, 0), rtol=1e-6, atol=1e-6
     )
@@ -122,24 +124,26 @@ def test_a_break_keeps_the_order(lab: Lab, method: str) -> None:
     exact = piecewise(t_end, at)
     h = STEPS[method]
     errors = [
-        abs(problem.solved(method, t_end, [0.0], step=x, breaks=[at]).y[0] - exact) for x in h
+        abs(problem.finished_run(method, t_end, [0.0], step=x, breaks=[at]).y[0] - exact) for x in h
     ]
     assert observed_order(errors) > get(method).order - 0.6, errors
     # off the grid: 0.4 does not divide the break's time any more
     moved = lab.problem("piecewise", 1, math.pi / 3)
     exact = piecewise(t_end, math.pi / 3)
-    error = abs(moved.solved(method, t_end, [0.0], step=h[-1], breaks=[math.pi / 3]).y[0] - exact)
+    error = abs(
+        moved.finished_run(method, t_end, [0.0], step=h[-1], breaks=[math.pi / 3]).y[0] - exact
+    )
     assert error < 3.0 * errors[-1]
     # and without the break the order is lost
-    rough = abs(moved.solved(method, t_end, [0.0], step=h[-1]).y[0] - exact)
+    rough = abs(moved.finished_run(method, t_end, [0.0], step=h[-1]).y[0] - exact)
     assert rough > 100.0 * error
 
 
 def test_an_adaptive_run_passes_a_break_smoothly(lab: Lab) -> None:
     problem = lab.problem("piecewise", 1, 1.0)
     options = {"rtol": 1e-10, "atol": 1e-12}
-    with_break = problem.solved("dop853", 2.4, [0.0], breaks=[1.0], **options)
-    without = problem.solved("dop853", 2.4, [0.0], **options)
+    with_break = problem.finished_run("dop853", 2.4, [0.0], breaks=[1.0], **options)
+    without = problem.finished_run("dop853", 2.4, [0.0], **options)
     assert with_break.y[0] == pytest.approx(piecewise(2.4, 1.0), rel=1e-9)
     assert 1.0 in with_break.samples.t
     assert with_break.statistics.rejected_steps <= 1  # the first step, chosen too long
@@ -151,15 +155,15 @@ def test_the_right_hand_side_never_sees_a_break(lab: Lab) -> None:
     for method in ("dop853", "pirk13"):
         for options in ({"step": 0.25}, {"step": 0.3}, {"rtol": 1e-6}):
             problem.at.calls = 0
-            problem.solved(method, 2.0, [0.0], breaks=[0.0, 1.0, 2.0], **options)
+            problem.finished_run(method, 2.0, [0.0], breaks=[0.0, 1.0, 2.0], **options)
             assert problem.at.calls == 0
-    problem.solved("rk4", 2.0, [0.0], step=0.25)
+    problem.finished_run("rk4", 2.0, [0.0], step=0.25)
     assert problem.at.calls > 0
 
 
 def test_fixed_steps_stay_on_the_grid(lab: Lab) -> None:
     problem = lab.problem("harmonic", 2, 1.0, 0.0)
-    run = problem.solved("rk4", 100.05, (1, 0), step=0.1, breaks=[33.333, 50.0])
+    run = problem.finished_run("rk4", 100.05, (1, 0), step=0.1, breaks=[33.333, 50.0])
     grid = np.array([i * 0.1 for i in range(1001)])
     grid[500] = 50.0  # a break within rounding of the grid is that grid point
     wanted = np.sort(np.concatenate([grid, [33.333, 100.05]]))
@@ -180,7 +184,7 @@ def test_rk4_is_stable_up_to_its_boundary(lab: Lab, zeta: float, limit: float) -
     sizes = []
     for part in (0.95, 1.05):
         h = part * limit / omega
-        run = problem.solved("rk4", 2000 * h, (1e-3, 0.0), step=h)
+        run = problem.finished_run("rk4", 2000 * h, (1e-3, 0.0), step=h)
         sizes.append(abs(run.y[0]) + abs(run.y[1]) / omega)
         assert run.statistics.largest_stiffness_index > 0.85 * 2.785
     assert sizes[0] < 1e-3
@@ -211,7 +215,11 @@ def test_a_method_from_outside_runs(lab: Lab) -> None:
     tableau: Callable[[], Tableau] = method_from_outside
     problem = lab.problem("mixed", 2)
     errors = [
-        float(np.abs(problem.solved(tableau(), 2.0, (1, 1), step=h).y - mixed_solution(2.0)).max())
+        float(
+            np.abs(
+                problem.finished_run(tableau(), 2.0, (1, 1), step=h).y - mixed_solution(2.0)
+            ).max()
+        )
         for h in (0.05, 0.025)
     ]
     assert observed_order(errors) == pytest.approx(3.0, abs=0.3)

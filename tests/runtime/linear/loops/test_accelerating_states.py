@@ -18,7 +18,7 @@ from tests.runtime.model.test_equilibrium_closed_loops import five_bar
 from tests.runtime.packing.loops.test_cut_tree import LAWS
 from tests.support.models import compile_scene
 from tests.support.scenes.linkages import OBLIQUE, bricard, four_bar, rod
-from tests.system.loops.test_flexible_against_tree import shackled, slider_crank
+from tests.system.loops.test_flexible_against_tree import shackled_beam, slider_crank
 
 STEP, G = 5e-5, 9.81
 #: The governor's arms (m, kg, kg m2 about their axes), sleeve (kg), and what else turns (kg m2).
@@ -75,7 +75,7 @@ MOVING: dict[str, tuple[Callable[[], mstmm.Model], float | list[float]]] = {
     "driven": (lambda: driven_five_bar(1.0, 0.9, 0), 0.6),
     "led": (lambda: compile_scene(coupled_five_bar()), -1.2),
     "a bent rod": (lambda: mstmm.compile(mstmm.Scene(**slider_crank())), [0.8] + [0.0] * 20),
-    "bent and shackled": (lambda: mstmm.compile(mstmm.Scene(**shackled())), 0.3),
+    "bent and shackled": (lambda: mstmm.compile(mstmm.Scene(**shackled_beam())), 0.3),
     "at rest": (lambda: compile_scene(four_bar(laws=SMOOTH, tilt=OBLIQUE)), 0.0),
 }
 

@@ -16,8 +16,8 @@ from tests.reference.jets import Array
 from tests.system.loops.test_flexible_against_tree import (
     SCENES,
     Scene,
-    opened,
-    shackled,
+    opened_tree,
+    shackled_beam,
     slider_crank,
 )
 
@@ -143,7 +143,7 @@ def test_against_the_tree_under_the_forces_that_close_it(name: str) -> None:
     linear = mstmm.compile(mstmm.Scene(**scene)).linearize()
     wrist = scene["hinge"][3]
     bent = wrist["outboard"] if "tip" in wrist["outboard"] else wrist["inboard"]
-    tree = opened(scene, rows, (bent, other))
+    tree = opened_tree(scene, rows, (bent, other))
     q = np.delete(linear.state.q, linear.model.coordinate_layout.hinges["wrist"].q_slice)
     pulls = [f"pull{k}" for k in range(rows)]
     free = tree.linearize(q, np.zeros(tree.nu), inputs=pulls)
@@ -175,7 +175,7 @@ def test_responses_are_those_of_the_matrices() -> None:
         assert np.abs(found.response[k] - wanted).max() < 1e-10 * np.abs(wanted).max()
 
 
-@pytest.mark.parametrize("make", [slider_crank, shackled])
+@pytest.mark.parametrize("make", [slider_crank, shackled_beam], ids=["slider_crank", "shackled"])
 def test_matrices_are_slopes_of_accelerations(make: Any) -> None:
     """Beside rest under weight, by central differences between closed states."""
     model = mstmm.compile(mstmm.Scene(**make()))

@@ -93,7 +93,7 @@ def test_refusals(modes: Modes) -> None:
 def test_one_is_chosen_on_the_page(modes: Modes, tmp_path: Path) -> None:
     path = modes.view(which=[0, 2]).save(tmp_path / "modes.html")
     near = "window.__viserMutable.nodePoseData['/{}'].position[0] === 0"
-    with browser.opened(path) as page:
+    with browser.open_page(path) as page:
         names = page.wait("[...(document.querySelector('#mstmm select') || [])].map((o) => o.text)")
         assert len(names) == 2
         assert page.wait(f"window.__viserMutable && {near.format(names[0])}"), page.console

@@ -13,7 +13,7 @@ from tests.support.scenes.gears import (
     PLANET,
     RING,
     SUN,
-    coupled,
+    coupled_model,
     inertia,
     pair,
     pin,
@@ -37,7 +37,7 @@ def test_rack_and_pinion() -> None:
     """The rack hangs on the pinion."""
     rack = {"name": "R", "type": "prismatic", "inboard": "ground", "outboard": "rack",
             "axis": [0, 1, 0]}  # fmt: skip
-    model = coupled(
+    model = coupled_model(
         [wheel("pinion", 0.05), wheel("rack", 1.0, 4.0)], [pin("P", "pinion"), rack],
         {"expression": "0.2*P.q - R.q"}, gravity=[0, -9.81, 0],
     )  # fmt: skip
@@ -51,7 +51,7 @@ def test_screw() -> None:
     hinge = {"name": "S", "type": "cylindrical", "inboard": "ground", "outboard": "nut",
              "axis": [0, 0, 1]}  # fmt: skip
     row = {"expression": f"S.displacement - {lead}*S.angle"}
-    model = coupled([nut], [hinge], row, gravity=[0, 0, -9.81])
+    model = coupled_model([nut], [hinge], row, gravity=[0, 0, -9.81])
     names = [str(name) for name in model.coordinate_layout.hinges["S"].q_names]
     fall = -9.81 / (1 + 0.01 / (2.0 * lead**2))
     wanted = {"displacement": fall, "angle": fall / lead}
@@ -62,7 +62,7 @@ def test_screw() -> None:
 def test_differential() -> None:
     """Of the torque on the case each wheel gets half, less what turns its own inertia."""
     moments = {"case": 0.3, "left": 0.05, "right": 0.2}
-    model = coupled(
+    model = coupled_model(
         [wheel(name, moment) for name, moment in moments.items()],
         [pin(n, n, law={"effort": 2.0 if n == "case" else 0.0}) for n in moments],
         {"expression": "left.q + right.q - 2*case.q"},
@@ -174,7 +174,7 @@ def test_refused(case: str) -> None:
 
 def test_drives_that_part_run_into_the_coupling() -> None:
     """At the start two drives agree, later they do not."""
-    model = coupled(
+    model = coupled_model(
         [wheel("a", 0.02), wheel("b", 0.3), wheel("c", 0.1)],
         [pin("A", "a", drive="t^2"), pin("B", "b"), pin("C", "c", drive="t^3")],
         GEAR, {"name": "belt", "expression": "B.q - C.q"},

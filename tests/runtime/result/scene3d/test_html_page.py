@@ -32,12 +32,14 @@ POINT = """(() => {
 def test_the_scene_looks_as_it_did(tmp_path: Path) -> None:
     path = tmp_path / "start.html"
     scenes.model().simulate(0.0).view(path)
-    with browser.opened(path) as page:
+    with browser.open_page(path) as page:
         size = {"width": 900, "height": 600, "deviceScaleFactor": 1, "mobile": False}
         page.ask("Emulation.setDeviceMetricsOverride", **size)
         assert page.wait("document.querySelector('#mstmm div').textContent")
         free = (180, 190, 880, 590)  # nothing but the scene is there
-        assert page.settled(lambda picture: near(blocks(picture, free, (14, 8)), "start.png"))
+        assert page.wait_for_picture(
+            lambda picture: near(blocks(picture, free, (14, 8)), "start.png")
+        )
         # A scene that does not move: the same body is in front whenever the browser gets to it.
         assert page.wait(POINT).split("\n")[:2] == ["hub", "mass 2 kg"]
 
@@ -46,7 +48,7 @@ def test_a_page(tmp_path: Path) -> None:
     path = tmp_path / "run.html"
     scenes.run().view(path, title="a <b>beam</b> & a rod", trails=["rod.tip"])
     assert path.stat().st_size < 10_000_000
-    with browser.opened(path) as page:
+    with browser.open_page(path) as page:
         clock = "(document.querySelector('#mstmm div') || {}).textContent"
         assert page.wait(f"/t = 0\\.[1-9]/.test({clock})"), page.console
         assert (

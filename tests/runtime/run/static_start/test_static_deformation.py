@@ -14,9 +14,9 @@ from tests.support.models import looped_model
 from tests.system.loops.test_flexible_against_tree import (
     Scene,
     hung,
-    meshed,
-    opened,
-    shackled,
+    meshed_slider_crank,
+    opened_tree,
+    shackled_beam,
     slider_crank,
 )
 
@@ -66,7 +66,7 @@ def test_a_run_that_damping_settles() -> None:
 
 
 SCENES = {"slider_crank": (slider_crank, ("bar.tip", "slider"), 2, [0]),
-          "shackled": (shackled, ("bar.tip", "far.tip"), 2, [0]),
+          "shackled": (shackled_beam, ("bar.tip", "far.tip"), 2, [0]),
           "hung": (hung, ("right.tip", "bar.tip"), 3, [0, 1, 2, 3, 5])}  # fmt: skip
 
 
@@ -85,7 +85,7 @@ def test_forces_that_close_the_loop_hold_the_shapes(name: str) -> None:
     assert model.loop_start is not None
     np.testing.assert_allclose(q[start], model.loop_start.start[0][start], rtol=0, atol=1e-12)
     wrist = layout.hinges["wrist"]
-    tree = opened(scene, rows, ends)
+    tree = opened_tree(scene, rows, ends)
     q, u = np.delete(q, wrist.q_slice), np.delete(u, wrist.u_slice)
 
     def required_efforts(forces: Array) -> Array:
@@ -138,7 +138,7 @@ def test_given_shapes_and_held_hinges_stay() -> None:
 
 
 def test_a_mesh_starts_bent_too() -> None:
-    model = looped_model(still(meshed()))
+    model = looped_model(still(meshed_slider_crank()))
     q, _ = model.initial_state()
     assert model.loop_start is not None
     moved = model.coordinate_layout.modal["bar"].q_slice

@@ -31,7 +31,7 @@ def wind(**changes: Any) -> Data:
     return {"name": "wind", "times": list(TIMES), "values": list(VALUES)} | changes
 
 
-def refused(data: Data) -> str:
+def message_of(data: Data) -> str:
     with pytest.raises(SceneError) as error:
         Scene.from_data(data)
     return str(error.value)
@@ -134,7 +134,7 @@ def test_what_a_file_of_columns_cannot_be(
     (tmp_path / "wind.csv").write_text(text)
     monkeypatch.chdir(tmp_path)
     signal = {"name": "wind", "file": "wind.csv", "column": column}
-    message = refused(motor(signal=[signal]))
+    message = message_of(motor(signal=[signal]))
     assert message.startswith('scene: signal "wind": file: ')
     for part in says:
         assert part in message
@@ -148,7 +148,7 @@ def test_a_file_outside_the_folder_of_the_scene_is_refused(
     (tmp_path / "scenes").mkdir()
     (tmp_path / "scenes" / "link").symlink_to(tmp_path / "wind.csv")
     monkeypatch.chdir(tmp_path / "scenes")
-    message = refused(motor(signal=[{"name": "wind", "file": name}]))
+    message = message_of(motor(signal=[{"name": "wind", "file": name}]))
     assert "expected a file in the folder of the scene" in message and "copy it there" in message
 
 
@@ -158,7 +158,7 @@ def test_a_file_that_is_none_is_refused(tmp_path: Path, monkeypatch: pytest.Monk
     (tmp_path / "latin.csv").write_bytes(b"t,\xe9\n0,1\n")
     for name, says in (("none.csv", "no such file"), ("folder", "no such file"),
                        ("latin.csv", "not UTF-8"), ("a\0b", "expected a CSV file")):  # fmt: skip
-        assert says in refused(motor(signal=[{"name": "wind", "file": name}]))
+        assert says in message_of(motor(signal=[{"name": "wind", "file": name}]))
 
 
 # --- what is refused ------------------------------------------------------------------------------
@@ -182,7 +182,7 @@ def test_a_file_that_is_none_is_refused(tmp_path: Path, monkeypatch: pytest.Monk
     ],
 )
 def test_what_a_signal_cannot_be(changes: Data, says: tuple[str, ...]) -> None:
-    message = refused(motor(signal=[wind(**changes)]))
+    message = message_of(motor(signal=[wind(**changes)]))
     for part in says:
         assert part in message
 
@@ -203,35 +203,35 @@ def test_what_a_signal_cannot_be(changes: Data, says: tuple[str, ...]) -> None:
     ],
 )  # fmt: skip
 def test_what_names_cannot_be(tables: Data, says: tuple[str, ...]) -> None:
-    message = refused(motor(**tables))
+    message = message_of(motor(**tables))
     for part in says:
         assert part in message, message
 
 
 def test_an_input_is_one_number() -> None:
-    message = refused(motor("wind[1]", signal=[wind()]))
+    message = message_of(motor("wind[1]", signal=[wind()]))
     assert "'wind' is a scalar; leave out [1]" in message
 
 
 def test_a_parameter_of_the_same_name_is_refused() -> None:
     data = motor(signal=[wind(name="pitch")])
     data["hinge"] = [hinge(type="sleeve", parameters={"pitch": 0.1})]
-    assert '"pitch" is also the name of a signal of the scene' in refused(data)
+    assert '"pitch" is also the name of a signal of the scene' in message_of(data)
 
 
 def test_a_drive_needs_rates() -> None:
     data = motor("0", input=[{"name": "angle", "value": 0.2}])
     data["hinge"][0]["drive"] = ["sin(angle)"]
-    message = refused(data)
+    message = message_of(data)
     assert 'hinge "shoulder": drive' in message and "needs the rates of the input" in message
     data["input"][0]["rates"] = [0.3, 0.1]
     Scene.from_data(data)
     data["hinge"][0]["drive"] = ["sin(q)"]
-    assert "expected a function of t and inputs only, found 'q'" in refused(data)
+    assert "expected a function of t and inputs only, found 'q'" in message_of(data)
     data["hinge"][0]["drive"] = ["2*abs(angle - 0.3) + where(t < 1, t, 1)"]
-    assert "a drive cannot switch with an input, found 'abs(angle - 0.3)'" in refused(data)
+    assert "a drive cannot switch with an input, found 'abs(angle - 0.3)'" in message_of(data)
     data["hinge"][0]["drive"] = ["1/(angle - 0.2)"]
-    assert "not finite at t = 0" in refused(data)
+    assert "not finite at t = 0" in message_of(data)
 
 
 # --- what is accepted -----------------------------------------------------------------------------
