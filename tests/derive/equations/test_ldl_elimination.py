@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from functools import cache
 from typing import Any
 
 import mpmath
@@ -99,8 +100,13 @@ def test_an_indefinite_matrix_has_no_factor() -> None:
 
 # --- the elimination ----------------------------------------------------------------------------
 
-GENERIC = {nu: {k.name: k.ir() for k in generic_kernels(nu)} for nu in (1, 2, 3, 6)}
 STILL: Values = {"Rc": [1, 0, 0, 0, 1, 0, 0, 0, 1], "r": [0, 0, 0]}
+
+
+@cache
+def generic_irs(nu: int) -> dict[str, KernelIR]:
+    """Kernels of the sweep for hinges with `nu` free speeds, by name."""
+    return {kernel.name: kernel.ir() for kernel in generic_kernels(nu)}
 
 
 def state(nu: int, numbers: random.Random) -> Values:
@@ -112,13 +118,13 @@ def factored_elimination(kernel: KernelIR, given: Values) -> Values:
     """S_Q, e_Q, udot and delta by way of the factored elimination."""
     names = {port.name for port in kernel.inputs}
     found = evaluate(kernel, {k: v for k, v in given.items() if k in names}, DIGITS)
-    recover = GENERIC[len(given["tau"])]["recover_factored"]
+    recover = generic_irs(len(given["tau"]))["recover_factored"]
     return found | evaluate(recover, given | found | STILL, DIGITS)
 
 
 def full(given: Values) -> Values:
     """The same by the full gain G of the looped engine's steps."""
-    steps = GENERIC[len(given["tau"])]
+    steps = generic_irs(len(given["tau"]))
     found = evaluate(steps["condense"], given | STILL | {"floor": [0, 0]}, DIGITS)
     return found | evaluate(steps["recover"], given | found | STILL, DIGITS)
 
@@ -134,7 +140,7 @@ def test_factored_elimination_of_any_subspace(nu: int) -> None:
     with mpmath.workdps(DIGITS):
         given = state(nu, numbers) | {"H": some(6 * nu, numbers)}
         given["J"] = [numbers.uniform(0.1, 1.0) for _ in range(nu)]
-        same(factored_elimination(GENERIC[nu]["eliminate"], given), full(given))
+        same(factored_elimination(generic_irs(nu)["eliminate"], given), full(given))
 
 
 @pytest.mark.parametrize("name", ["pin", "cylindrical", "ball", "free"])

@@ -13,9 +13,6 @@ from mstmm.derive.verification.kernel_evaluation import evaluate
 
 DIGITS = 40
 KERNELS = {kernel.name: kernel.ir() for kernel in loop_kernels()}
-COMPLEMENT = {
-    nu: next(k for k in generic_kernels(nu) if k.name == "complement").ir() for nu in range(7)
-}
 
 
 def matrix(numbers: Any, columns: int) -> Any:
@@ -32,7 +29,8 @@ def test_complement(nu: int, plain: bool) -> None:
     if plain:
         h = [float(i == 5 - k) for i in range(6) for k in range(nu)]
     with mpmath.workdps(DIGITS):
-        w = matrix(evaluate(COMPLEMENT[nu], {"H": h}, DIGITS)["W"], 6)
+        complement = next(k for k in generic_kernels(nu) if k.name == "complement").ir()
+        w = matrix(evaluate(complement, {"H": h}, DIGITS)["W"], 6)
         own = matrix(h, nu) if nu else mpmath.matrix(6, 0)
         for i in range(6):
             for k in range(nu):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from functools import cache
 from typing import Any
 
 import mpmath
@@ -16,13 +17,19 @@ from mstmm.derive.lower.kernel_lowering import lower
 from mstmm.derive.verification.equation_evaluation import evaluate_equations
 from mstmm.derive.verification.kernel_evaluation import evaluate
 from mstmm.derive.verification.sample_points import random_rotation
+from mstmm.ir import KernelIR
 from mstmm.ir.interpreter import GuardFailure
 
 DIGITS = 40
 SPEEDS = (0, 1, 2, 3, 6)
 STEPS = {kernel.name: kernel.ir() for kernel in qr_kernels()}
-GENERIC = {nu: {k.name: k.ir() for k in generic_kernels(nu)} for nu in SPEEDS}
 Values = dict[str, Any]
+
+
+@cache
+def generic_irs(nu: int) -> dict[str, KernelIR]:
+    """Kernels of the sweep for hinges with `nu` free speeds, by name."""
+    return {kernel.name: kernel.ir() for kernel in generic_kernels(nu)}
 
 
 def some(count: int, numbers: random.Random) -> list[float]:
@@ -156,7 +163,7 @@ def test_loads_of_a_body_by_its_rows() -> None:
 
 def across(nu: int, given: Values) -> Values:
     """G, g, and what reaches a parent that has rows already, by rotations of rows."""
-    found = evaluate(GENERIC[nu]["qr_eliminate"], given, DIGITS)
+    found = evaluate(generic_irs(nu)["qr_eliminate"], given, DIGITS)
     behind = {name: found[name] for name in ("V", "d_V", "e_Q")}
     merged = evaluate(STEPS["merge"], given | behind, DIGITS)
     return {"G": found["G"], "g": found["g"]} | {name: merged[name] for name in ("U", "d", "e_I")}
@@ -187,7 +194,7 @@ def test_a_hinge_is_passed_as_by_the_riccati_sweep(
         whole = riccati_form(given["U"], given["d"], given["e"])
         riccati = {name: given[name] for name in ("Rc", "r", "H", "J", "floor", "tau")}
         wanted = evaluate(
-            GENERIC[nu]["condense"], riccati | {"S": whole["S"], "e": whole["e_S"]}, DIGITS
+            generic_irs(nu)["condense"], riccati | {"S": whole["S"], "e": whole["e_S"]}, DIGITS
         )
         assert close(found["G"], wanted["G"]) and close(found["g"], wanted["g"])
         parent = riccati_form(given["U_P"], given["d_P"], [0] * 6)
@@ -203,7 +210,7 @@ def test_a_motion_without_inertia_is_undetermined() -> None:
         "U": rows(random.Random(1), missing=0),
     }  # fmt: skip
     with pytest.raises(GuardFailure, match="moves no inertia"):
-        evaluate(GENERIC[1]["qr_eliminate"], given, DIGITS)
+        evaluate(generic_irs(1)["qr_eliminate"], given, DIGITS)
 
 
 def test_two_speeds_that_are_one_motion_are_undetermined() -> None:
@@ -213,4 +220,4 @@ def test_two_speeds_that_are_one_motion_are_undetermined() -> None:
         "e": [0] * 6, "tau": [1, 2], "U": rows(random.Random(3)),
     }  # fmt: skip
     with pytest.raises(GuardFailure, match="pivot 2 of 2 vanishes"):
-        evaluate(GENERIC[2]["qr_eliminate"], given, DIGITS)
+        evaluate(generic_irs(2)["qr_eliminate"], given, DIGITS)

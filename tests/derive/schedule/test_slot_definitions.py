@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -24,7 +25,7 @@ from mstmm.derive.schedule.slot_definitions import CONSTANTS, ROLES, SLOTS, TRAI
 from mstmm.derive.schedule.sweeps import SWEEPS
 from mstmm.ir import KernelIR
 
-SPECS = stored_elements.generated_specs()
+specs = cache(stored_elements.generated_specs)
 
 
 def steps() -> Iterator[Step]:
@@ -46,7 +47,7 @@ def kernel_of(step: Call) -> KernelIR:
     elif element in POINTER_CALLEES:
         key, names = POINTER_CALLEES[element]
         name = names.get(name, name)
-    return next(kernel for kernel in SPECS[key].kernels if kernel.name == name)
+    return next(kernel for kernel in specs()[key].kernels if kernel.name == name)
 
 
 def slots_of(step: Step) -> Iterator[str]:
@@ -126,27 +127,27 @@ def reverse_inputs(kernel: KernelIR) -> KernelIR:
 
 def test_the_order_of_ports_may_change() -> None:
     """A kernel with other places for its arrays is called by the same words, and rightly."""
-    frames = SPECS["sweep", "frames"]
+    frames = specs()["sweep", "frames"]
     kernels = tuple(reverse_inputs(k) if k.name == "pose" else k for k in frames.kernels)
-    other = SPECS | {("sweep", "frames"): replace(frames, kernels=kernels)}
+    other = specs() | {("sweep", "frames"): replace(frames, kernels=kernels)}
 
     def pose_arguments(text: str) -> str:
         found = re.search(r"return mstmm_sweep_frames_pose\(\s*([^)]*)\)", text)
         assert found
         return " ".join(found[1].split())
 
-    assert pose_arguments(kernel_calls_header(SPECS)) == "to.A_I, to.x_I, to.Rc, to.r, to.A, to.x"
+    assert pose_arguments(kernel_calls_header(specs())) == "to.A_I, to.x_I, to.Rc, to.r, to.A, to.x"
     assert pose_arguments(kernel_calls_header(other)) == "to.r, to.Rc, to.x_I, to.A_I, to.A, to.x"
     assert re.findall(r"\.A_I = [^,]*", sweep_files(other)["sweep_steps.c"]) == re.findall(
-        r"\.A_I = [^,]*", sweep_files(SPECS)["sweep_steps.c"]
+        r"\.A_I = [^,]*", sweep_files(specs())["sweep_steps.c"]
     )
 
 
 def test_hinges_of_one_room_have_the_same_ports() -> None:
-    pin = SPECS["hinge", "pin"]
+    pin = specs()["hinge", "pin"]
     kernels = tuple(reverse_inputs(k) if k.name == "condense" else k for k in pin.kernels)
     with pytest.raises(ValueError, match="condense: not every element has the same ports"):
-        collect_callees(SPECS | {("hinge", "pin"): replace(pin, kernels=kernels)})
+        collect_callees(specs() | {("hinge", "pin"): replace(pin, kernels=kernels)})
 
 
 @pytest.mark.parametrize(
@@ -163,7 +164,7 @@ def test_hinges_of_one_room_have_the_same_ports() -> None:
 )  # fmt: skip
 def test_names_that_nobody_knows_are_not_printed(step: Call, said: str) -> None:
     with pytest.raises(ValueError, match=said):
-        function_text(Pass("wrong", "body", "", (step,)), collect_callees(SPECS))
+        function_text(Pass("wrong", "body", "", (step,)), collect_callees(specs()))
 
 
 def test_a_pass_is_printed_from_its_description_alone() -> None:
@@ -177,7 +178,7 @@ def test_a_pass_is_printed_from_its_description_alone() -> None:
         ),
         skip="idle", given=("given.T",),
     )  # fmt: skip
-    text = " ".join(function_text(whole, collect_callees(SPECS)).split())
+    text = " ".join(function_text(whole, collect_callees(specs())).split())
     assert "mstmm_at_power_of_links(mstmm_state *state, int index, real *given_T)" in text
     assert "if (mstmm_idle(state->observed, body)) return 0;" in text
     assert "real v[3]; real P[1];" in text
