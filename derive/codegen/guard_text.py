@@ -40,8 +40,8 @@ class Guards:
             f"{GUARDS_NAME}[0] &= {truth};"
         ]
 
-    def verdict(self) -> list[str]:
-        """Lines after the last guard, which return the function's result."""
+    def epilogue(self) -> list[str]:
+        """Lines after the last guard, which return the failure code of the function."""
         if self.in_lanes:
             return self._lane_lines()
         if not self._conditions:

@@ -166,7 +166,7 @@ def function_text(kernel: KernelIR, name: str, dialect: Dialect) -> str:
         ]
     else:
         lines += parts.calls()
-    lines += guards.verdict()
+    lines += guards.epilogue()
     parameters = parameter_list(kernel, dialect) + (
         ["int *restrict codes"] if dialect.vector else []
     )

@@ -149,7 +149,7 @@ def _engine_files(specs: Sequence[ElementSpec]) -> dict[str, str]:
 
 
 def complex_source(specs: Mapping[tuple[str, str], ElementSpec]) -> str:
-    """`complex_steps.c`: the tangent's elimination in complex numbers."""
+    """C text of `complex_steps.c`: elimination of the tangent matrix in complex numbers."""
     kernels = [_kernel_view(*pair, REAL_PORTS) for pair in complex_kernels(specs)]
     return to_complex(
         _render("complex_steps.c.jinja", kernels=kernels, passes=complex_passes(specs))

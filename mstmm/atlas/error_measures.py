@@ -51,10 +51,11 @@ def refinement_correction(
 ) -> float:
     """Largest relative error of accelerations over states (q, u), by iterative refinement.
 
-    It is the correction by one step of refinement over the largest acceleration, equal to the error
-    in its leading digits.  The accelerations are those of the model, or of a function of (q, u).
-    Their residual comes from inverse dynamics, which eliminates nothing, and is solved for by the
-    Riccati sweep (Higham, Accuracy and Stability of Numerical Algorithms, 2002, ch. 12).
+    The error is that of one step of refinement: the change of the accelerations over the largest
+    acceleration, right in its leading digits.  The accelerations are those of the model, or of a
+    function of (q, u).  Their residual comes from inverse dynamics, which needs no elimination; the
+    Riccati sweep solves for the change (Higham, Accuracy and Stability of Numerical Algorithms,
+    2002, ch. 12).
     """
     largest = 0.0
     for q, u in states:

@@ -188,9 +188,10 @@ class _FormulaEquations:
         return [formula(x) for x in np.where(is_zero, 0.0, linear.state.udot).tolist()]
 
     def input_matrix(self, pushes: Sequence[Channel]) -> Rows:
-        """Input matrix V or W, from the efforts of the tree at rest under a symbol per input.
+        """Matrix V of M x'' + C x' + K x = V v + W w, or W, for the given channels.
 
-        The efforts are proportional to the symbols.
+        Each channel acts with a symbol on the tree at rest.  The required efforts are proportional
+        to the symbols; their factors are the entries.
         """
         n = len(self._linear.free_speed_indices)
         if not pushes:

@@ -58,7 +58,7 @@ def level_table(chart: ChartRecord) -> Table:
 
 
 def point_table(chart: ChartRecord) -> Table:
-    """All runs."""
+    """Table of all runs: head, indices of right-aligned columns, rows."""
     head = (
         "model", "method", "setting", "error", "CPU time", "runs", "steps", "evaluations",
         "factorizations", "note",

@@ -28,13 +28,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class OffTreeCoupling:
-    """Unknowns outside the tree, with their groups and passes.
+    """Unknown loads outside the tree, and the band matrix that relates them.
 
-    The unknowns are 6 for each of `bodies`, then `efforts` (index in the workspace, speed) and
-    `rows` (frame, direction, speed, row).  For each group: `members`, `readers` (unknowns that
-    depend on the group), and `moved_speeds` (speeds).  `passes` are the unknowns solved together.
-    `ranks` (count,) are the positions of the unknowns in the matrix, which has `lower_bandwidth`
-    and `upper_bandwidth` diagonals below and above the main one.
+    The unknowns are 6 loads for each of `bodies`, then `efforts` (index in the workspace, speed)
+    and `rows` (frame, direction, speed, row).  Unknowns that act on the same part of the tree form
+    a group.
+
+    Attributes:
+        members: unknowns of each group.
+        readers: for each group, the unknowns that depend on the motion of its part of the tree.
+        moved_speeds: for each group, the speeds of its part of the tree.
+        passes: for each pass over the tree, the unknowns whose matrix columns it computes.
+        ranks: (count,) positions of the unknowns in the matrix.
+        lower_bandwidth, upper_bandwidth: diagonals below and above the main one.
     """
 
     bodies: Sequence[int]
@@ -68,9 +74,7 @@ class OffTreeCoupling:
             groups[list(members)] = number
         first = engine.lib.MSTMM_BLOCK_E
         loads = [blocks[body] + first + k for body in self.bodies for k in range(6)]
-        pass_units = [
-            [loads[k] for k in group_list if k < len(loads)] for group_list in self.passes
-        ]
+        pass_units = [[loads[k] for k in unknowns if k < len(loads)] for unknowns in self.passes]
         arrays: dict[str, tuple[str, Sequence[Any]]] = {
             "bodies": ("int[]", self.bodies),
             "efforts": ("int64_t[]", [tree_index for tree_index, _ in self.efforts]),
@@ -164,9 +168,10 @@ def _independent_groups(
     feeling: Sequence[set[int]],
     speeds: dict[int, list[int]],
 ) -> OffTreeCoupling:
-    """Find groups, passes and matrix positions of unknowns.
+    """Order unknowns for a narrow band matrix, and gather those that one pass can compute.
 
-    `moving` is the group that each unknown moves, `feeling` the groups on which it depends.
+    `moving` is the part of the tree (a body index) that each unknown moves, `feeling` the parts on
+    whose motion it depends; `speeds` are the speeds of each part.
     """
     groups = _order_groups(sorted(set(moving)), {frozenset(dependency) for dependency in feeling})
     members, readers = (

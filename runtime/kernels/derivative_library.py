@@ -60,7 +60,10 @@ def open_derivative_library(path: Path, key: str) -> DerivativeLibrary:
 
 
 class DerivativeLibrary:
-    """Tangent kernels of one library, by index.  Safe to call from several threads."""
+    """Compiled directional derivatives of a scene's functions; safe to call from several threads.
+
+    A kernel is named by its index in the library.
+    """
 
     def __init__(self, loaded: ctypes.CDLL, found: _CLibrary) -> None:
         self._library = loaded

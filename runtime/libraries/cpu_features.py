@@ -16,9 +16,10 @@ _CONSTANT_LINES = (
 
 @cache
 def features(source: Path = Path("/proc/cpuinfo")) -> dict[str, str]:
-    """Model and features of the first processor; the host name if the system does not list them.
+    """Fields of the first processor in /proc/cpuinfo, and the machine type.
 
-    With the host name no two machines share a library, which is slow and safe.
+    Where no features are listed the host name is added, so that no two machines share a library:
+    slow, but safe.
     """
     lines_found = _first_block(source)
     if not {"flags", "Features", "isa", "features"} & lines_found.keys():

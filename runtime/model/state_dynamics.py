@@ -43,9 +43,9 @@ class DynamicsQueries(KinematicQueries):
         """Accelerations udot (..., nu) at q (..., nq), u (..., nu) and t (s).
 
         `efforts` (..., nu; N, N*m) act in addition.  Driven coordinates have the values of their
-        drives, whatever q and u are.  A batch (leading axes) uses vector lanes if there is fused
-        code, and `threads` threads (None: the number of processors); with one engine the
-        result of a state is bit for bit independent of the batch and of the threads.
+        drives, whatever q and u are.  A batch (leading axes) uses `threads` threads (None: the
+        number of processors) and, if there is fused code, vector lanes.  The result of a state does
+        not depend on the batch and on the threads, bit for bit, unless the engine changes.
 
         Raises SceneError for a wrong shape, NumericalFailure naming the state and the hinge whose
         motion is undetermined.

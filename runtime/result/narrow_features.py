@@ -240,9 +240,10 @@ def _enclosures_around(
 def _multi_variable_loads(
     model: CompiledScene,
 ) -> Iterator[tuple[ActiveExpression, Hinge | None, dict[str, float], list[str]]]:
-    """Loads and efforts that depend on several state variables and may have narrow peaks.
+    """Loads and efforts with possible narrow peaks that are no functions of one coordinate.
 
-    Each with its hinge, constants and names.
+    They depend on a speed, on a spring, or on several state variables.  Each comes with its hinge,
+    constants and names of variables.
     """
     for load in active_expressions(model.scene):
         if load.condition or load.drive or load.expression.depends_on_time_only:

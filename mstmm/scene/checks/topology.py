@@ -91,7 +91,7 @@ class Topology:
 
     @cached_property
     def links(self) -> tuple[TreeBody, ...]:
-        """All bodies in tree order."""
+        """Bodies with an inboard hinge in the tree, in tree order; without carried bodies."""
         parents = self.parents
         children: list[list[int]] = [[] for _ in parents]
         for position, parent in enumerate(parents):

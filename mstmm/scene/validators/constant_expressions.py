@@ -40,7 +40,10 @@ def current_inputs() -> frozenset[str]:
 
 
 def parse_with_constants(text: str) -> Expression:
-    """Parse an expression with the named constants of the scene.  Raises ExpressionError."""
+    """Parse an expression with the constants of the scene that is being validated.
+
+    Raises ExpressionError.
+    """
     return parse(text, constants=current_constants())
 
 

@@ -57,8 +57,9 @@ class IndependentSpeeds:
     def select(self, q: Array) -> tuple[int, ...]:
         """Choose the indices of speeds that determine all others at q (nq,).
 
-        Each is the first in the scene that distinguishes the remaining motions, in characteristic
-        scales, at least a quarter as well as any other.
+        These are rows of the matrix of possible motions, each speed in its characteristic scale.
+        Each choice is the first in the scene whose row, once the rows chosen before are projected
+        out, is at least a quarter as long as the longest.
         """
         scaled_motions = self._motions(q) / self.sizes[:, None]
         return tuple(sorted(select_rows(scaled_motions, self._free.tolist(), _SELECTION_RATIO)[0]))

@@ -60,7 +60,8 @@ def accelerations(
 ) -> Array:
     """Compute udot (n, nu) of a batch with at most `threads` threads (None: one per processor).
 
-    One state (no leading axis) uses the scalar code, others the lanes.  Raises SceneError for an
+    One state (no leading axis) uses the fused scalar code, batches the fused vector lanes; the
+    looped engine does both where there is no fused code.  Raises SceneError for an
     invalid number of threads, and NumericalFailure or UndeterminedMotionError, which name the state
     and the hinge.
     """

@@ -180,7 +180,7 @@ def first_rtol(target: float, kind: Kind, radians: float = 0.0) -> float:
 def estimate_error(runs: Sequence[ToleranceRun]) -> float | None:
     """Estimated error of the last of `runs`; None for a single one.
 
-    Ordered from loose to tight, explicit runs after others.
+    The runs are ordered from loose to tight, explicit ones after others.
     """
     if len(runs) < 2:
         return None

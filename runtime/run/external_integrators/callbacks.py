@@ -53,7 +53,7 @@ class Equations:
         return self._jacobian()(self._inside(t), np.ascontiguousarray(y, dtype=np.float64))
 
     def _inside(self, t: float) -> float:
-        """Time strictly between the breaks, where the right-hand side is unique."""
+        """`t`, clamped to times between the breaks, where the right-hand side is unique."""
         return min(max(t, self.bounds[0]), self.bounds[1])
 
     def _c(self, array: Array) -> Any:

@@ -1,4 +1,8 @@
-"""Events: located to rounding, fired in order, never missed silently between step ends."""
+"""Events: located to rounding, fired in order, never missed silently between step ends.
+
+Whole scenes are in `tests/system/events`, SciPy and SUNDIALS in
+`tests/runtime/run/external_integrators`.
+"""
 
 from __future__ import annotations
 
