@@ -102,7 +102,7 @@ def robots(record: dict[str, Any], run: ModuleType) -> str:
     )  # fmt: skip
 
 
-def non_stiff(record: dict[str, Any], run: ModuleType) -> str:
+def non_stiff_table(record: dict[str, Any], run: ModuleType) -> str:
     """Time of ten seconds of motion by scene and program."""
     titles = {"arm": "three rods on pins", "balls": "three rods on balls"}
     programs = list(record["results"][0]["curves"])
@@ -114,7 +114,7 @@ def non_stiff(record: dict[str, Any], run: ModuleType) -> str:
     return rows_to_markdown(["scene", *programs], rows)
 
 
-def stiff(record: dict[str, Any], run: ModuleType) -> str:
+def stiff_table(record: dict[str, Any], run: ModuleType) -> str:
     """Time of the cheapest accurate setting of implicit methods by case and program."""
     explicit = {"dop853", "dopri5", "dop853, fused", "auto"}
     peers = ("SciPy Radau", "CVODE BDF", "Exudyn")
@@ -138,7 +138,7 @@ def stiff(record: dict[str, Any], run: ModuleType) -> str:
     return rows_to_markdown(heading, rows)
 
 
-def flexible(record: dict[str, Any], run: ModuleType) -> str:
+def flexible_table(record: dict[str, Any], run: ModuleType) -> str:
     """Time and error of the cheapest accurate setting by scene and program."""
     titles = {"spin-up": "spin-up of a beam, 20 s", "chain": "chain of 100 strips, 3 s"}
     rows = []
@@ -170,8 +170,14 @@ def write_page(load_run_module: Callable[[str], Any]) -> None:
     """Replace the text between the markers of the page."""
     data, text = records(), PAGE.read_text(encoding="utf-8")
     tables = {"statement": statement(data)}
-    builders = {"forward_dynamics": accelerations, "robots": robots, "work_precision": non_stiff,
-                "stiff": stiff, "flexible": flexible, "long_chains": long_chains}  # fmt: skip
+    builders = {
+        "forward_dynamics": accelerations,
+        "robots": robots,
+        "work_precision": non_stiff_table,
+        "stiff": stiff_table,
+        "flexible": flexible_table,
+        "long_chains": long_chains,
+    }
     sys.path.insert(0, str(HERE / "stiff"))
     import cost_measure
 

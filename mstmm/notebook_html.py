@@ -38,7 +38,7 @@ def collapsible(summary: str, body: str) -> str:
 class NotebookDisplay:
     """Base class of objects that notebooks display, in all formats that the class provides."""
 
-    def _plain(self) -> str:
+    def _plain_text(self) -> str:
         """Plain text, for displays without other formats."""
         return repr(self)
 
@@ -47,7 +47,7 @@ class NotebookDisplay:
     ) -> dict[str, str]:
         """Representations by MIME type: those of `include` if given, without `exclude`."""
         builders: dict[str, Callable[[], str] | None] = {
-            "text/plain": self._plain,
+            "text/plain": self._plain_text,
             "text/html": getattr(self, "_repr_html_", None),
             "text/latex": getattr(self, "_repr_latex_", None),
         }

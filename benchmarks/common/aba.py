@@ -281,7 +281,7 @@ class Body:
         )
         self.position, self.armature = numbers.vector(link.position), numbers.scalar(link.armature)
 
-    def rigid(self) -> Inertia:
+    def rigid_inertia(self) -> Inertia:
         m = [[self.mass if a == b else ZERO for b in range(3)] for a in range(3)]
         return Inertia(m, [[-x for x in row] for row in skew(self.first_moment)], self.inertia)
 
@@ -357,7 +357,7 @@ def quaternion_rate(q: Vector, w: Vector) -> Vector:
 
 def eliminate_body(body: Body, tau: Vector) -> None:
     """Backward pass: inertia and force on the inboard body, about its origin."""
-    s, (f, n) = body.rigid(), body.bias_force()
+    s, (f, n) = body.rigid_inertia(), body.bias_force()
     for child in body.children:
         s = s + child.load_on_parent[0]
         f, n = vector_sum(f, child.load_on_parent[1]), vector_sum(n, child.load_on_parent[2])

@@ -26,7 +26,7 @@ def _pin(name: str, inboard: str, outboard: str, axis: list[float] = _Z, **more:
     }  # fmt: skip
 
 
-def _free(name: str, body: str, q: list[float], u: list[float]) -> Scene:
+def _free_hinge(name: str, body: str, q: list[float], u: list[float]) -> Scene:
     return {
         "name": name, "type": "free", "inboard": "ground", "outboard": body,
         "initial": {"q": q, "u": u},
@@ -43,7 +43,7 @@ def switched_satellites(rng: np.random.Generator) -> Sample:
     wings = [_beam(n, length, 0.6, ei, modes=shapes, frame="tangent", basis="clamped-free")
              for n in ("east", "west")]  # fmt: skip
     hinges = [
-        _free("f", "hub", [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], [0.0] * 6),
+        _free_hinge("f", "hub", [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], [0.0] * 6),
         *({"name": f"h{n}", "type": "fixed", "inboard": f"hub.{e}", "outboard": n}
           for n, e in (("east", "p"), ("west", "n"))),
     ]  # fmt: skip
@@ -66,7 +66,7 @@ def rolling_coins(rng: np.random.Generator) -> Sample:
     spin, turn = _number(rng, 3, 12), _number(rng, -2, 2)
     coin = {"name": "coin", "mass": m, "inertia": [m * r * r / 4, m * r * r / 2, m * r * r / 4]}
     q = [0.0, 0.0, r * math.cos(lean), math.cos(lean / 2), math.sin(lean / 2), 0.0, 0.0]
-    start = _free("motion", "coin", q, [spin * r, 0.0, 0.0, 0.0, spin, turn * math.cos(lean)])
+    start = _free_hinge("motion", "coin", q, [spin * r, 0.0, 0.0, 0.0, spin, turn * math.cos(lean)])
     return _scene([coin], [start], [0.0, 0.0, -9.81], constraint=[_rolling("coin", r)]), 3.0
 
 
@@ -81,7 +81,8 @@ def wheel_axles(rng: np.random.Generator) -> Sample:
     ]
     v, w = _number(rng, 0.5, 2.0), _number(rng, -1.5, 1.5)
     hinges = [
-        _free("motion", "axle", [0.0, 0.0, r, 1.0, 0.0, 0.0, 0.0], [v, 0.0, 0.0, 0.0, 0.0, w]),
+        _free_hinge("motion", "axle", [0.0, 0.0, r, 1.0, 0.0, 0.0, 0.0],
+                    [v, 0.0, 0.0, 0.0, 0.0, w]),
         _pin("pl", "axle.l", "left", _Y, initial={"u": [(v - b * w) / r]},
              law={"effort": _number(rng, -0.5, 0.5)}),
         _pin("pr", "axle.r", "right", _Y, initial={"u": [(v + b * w) / r]}),
@@ -149,7 +150,7 @@ def spring_bodies(rng: np.random.Generator) -> Sample:
     count = int(rng.integers(2, 5))
     bodies = [_lump(rng, f"b{i}") for i in range(count)]
     hinges = [
-        _free(f"f{i}", f"b{i}",
+        _free_hinge(f"f{i}", f"b{i}",
               [2.0 * i, _number(rng, -0.3, 0.3), 0.0, *_ball_start(rng, 1.0)["q"]],
               rng.uniform(-1, 1, 6).tolist())
         for i in range(count)

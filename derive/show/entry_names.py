@@ -115,7 +115,7 @@ class DeclaredNames:
                 return parts
         return ()
 
-    def written(self, array: str, length: int) -> tuple[str, ...]:
+    def code_entries(self, array: str, length: int) -> tuple[str, ...]:
         """Entries of an array as in code (p.stiffness, w[0]); empty if none are declared."""
         base, slope = array.removeprefix("d_"), "d_" if array.startswith("d_") else ""
         prefix = f"{slope}{base}." if base in self.parts_by_array else slope

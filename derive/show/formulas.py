@@ -214,7 +214,7 @@ def _indexed_name(shown: Node, index: str) -> Name:
 
 def _entry_name(shown: Node, shape: tuple[int, int], i: int, j: int) -> Node:
     if isinstance(shown, Name):
-        index = entry_index(shown.name.written(), shape, i, j)
+        index = entry_index(shown.name.code_name(), shape, i, j)
         return Name(shown.name, shown.accent, shown.index + index)
     return Row((shown, Word(f"[{entry_index('', shape, i, j)}]")))
 

@@ -29,7 +29,7 @@ class _ListingWriter:
 
     def __init__(self, kernel: KernelIR, names: DeclaredNames) -> None:
         ports = (*kernel.inputs, *kernel.outputs)
-        self.names = {p.name: names.written(p.name, p.length()) for p in ports}
+        self.names = {p.name: names.code_entries(p.name, p.length()) for p in ports}
 
     def lines(self, statement: Statement, indent: str = "") -> list[str]:
         if isinstance(statement, Assign):

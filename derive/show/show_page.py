@@ -212,7 +212,7 @@ def _latex_row(row: QuantityRow) -> str:
 def _symbol_cell(symbol: Node) -> str:
     """A name in a table, where long words may be broken."""
     if isinstance(symbol, Name) and symbol.name.upright and not symbol.index:
-        return _breakable_name(symbol.name.written())
+        return _breakable_name(symbol.name.code_name())
     return f"${latex_text(symbol)}$"
 
 

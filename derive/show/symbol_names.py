@@ -26,7 +26,7 @@ class SymbolName:
     subscript: str = ""
     upright: bool = False
 
-    def written(self) -> str:
+    def code_name(self) -> str:
         """Name as written in code, without dots."""
         return "_".join(filter(None, (self.base, self.subscript)))
 

@@ -296,7 +296,7 @@ def _check_specialised_kernels(
             generic_outputs[name],
             MAX_ALGEBRA_ERROR,
         )
-    balance = Balance.drawn(len(u), numbers)
+    balance = Balance.from_random_numbers(len(u), numbers)
     results = [balance.sweep(call, parameters), balance.sweep(generic, subspace)]
     if any(abs(x) > MAX_ACCELERATION for x in results[1]["udot"]):
         raise ArithmeticError("singular coordinates")
@@ -328,7 +328,7 @@ class Balance:
     parent: list[Any]
 
     @classmethod
-    def drawn(cls, nu: int, numbers: random.Random) -> Balance:
+    def from_random_numbers(cls, nu: int, numbers: random.Random) -> Balance:
         factor = mp.matrix([random_numbers(6, numbers) for _ in range(6)])
         full = factor * factor.T + mp.eye(6)
         upper = [full[i, j] for i in range(6) for j in range(i, 6)]
@@ -378,7 +378,7 @@ def sweep_properties(call: Call, nu: int) -> tuple[Property, ...]:
                 random_numbers(6 * nu, numbers),
                 [abs(x) for x in random_numbers(nu, numbers)],
             )
-            balance = Balance.drawn(nu, numbers)
+            balance = Balance.from_random_numbers(nu, numbers)
             swept = balance.sweep(call, {"H": h, "J": rotor})
             balance.check_balance(swept, matrix_of_rows(h, nu) if nu else None, rotor, errors)
     return errors.properties()

@@ -73,7 +73,7 @@ class EquationSheet(NotebookDisplay):
         """Page as one self-contained HTML document."""
         return render_page(self.title, self.items, "html")
 
-    def _plain(self) -> str:
+    def _plain_text(self) -> str:
         return self.text
 
     def _repr_latex_(self) -> str:

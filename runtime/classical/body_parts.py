@@ -124,7 +124,7 @@ class _PartBuilder:
             name = scene.bodies.name(link.body)
             if not self.expanded.is_node(name):
                 self.owner[place] = (len(self.origins), None)
-                yield self._rigid(place)
+                yield self._rigid_part(place)
             elif name not in passages:  # its inboard hinge is one of the scene
                 beam = name.removesuffix(f"/{HELD}")
                 body = self.expanded.bodies[beam]
@@ -134,7 +134,7 @@ class _PartBuilder:
             else:
                 self.owner[place] = (self.owner[link.parent][0], passages[name].port)
 
-    def _rigid(self, place: int) -> Part:
+    def _rigid_part(self, place: int) -> Part:
         kind, springs = self.kinds[place]
         self.origins.append(np.zeros(3))
         body_parameters = np.array(self.packed.system.body(place).body_p)

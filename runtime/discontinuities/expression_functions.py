@@ -122,7 +122,7 @@ class ExpressionFunctions:
         return value is not None and value >= 0 and value == int(value)
 
     def _margin_of(self, args: tuple[int, ...], difference: Callable[..., Enclosure]) -> Margin:
-        term_indices = self._below(args)
+        term_indices = self._subterm_indices(args)
         terms, constants = self.expression.terms, self.constants
 
         def margin(t: Interval) -> Enclosure:
@@ -132,7 +132,8 @@ class ExpressionFunctions:
 
         return margin
 
-    def _below(self, args: tuple[int, ...]) -> list[int]:
+    def _subterm_indices(self, args: tuple[int, ...]) -> list[int]:
+        """Indices of `args` and of all terms on which they depend."""
         visited, waiting = set[int](), list(args)
         while waiting:
             term_index = waiting.pop()

@@ -64,7 +64,7 @@ class OffTreeCoupling:
         """Row length of the factored band matrix, including fill-in by row exchanges."""
         return min(self.count, 2 * self.lower_bandwidth + self.upper_bandwidth + 1)
 
-    def written(self, engine: LoopedEngine) -> list[Any]:
+    def c_record(self, engine: LoopedEngine) -> list[Any]:
         """C record of the unknowns, followed by the memory to which it points."""
         ffi, blocks = engine.ffi, engine.packed.written.blocks
         record = ffi.new("mstmm_couplings *")

@@ -41,7 +41,7 @@ class TangentMatrix:
         self.numbers = np.zeros(max(1, _lay_out_tangent(engine)))
         self.work = np.zeros(engine.lib.mstmm_tangent_work(model, slopes.slots))
         across = off_tree_coupling(engine)
-        self.couplings, self.off_tree_count = across.written(engine), across.count
+        self.couplings, self.off_tree_count = across.c_record(engine), across.count
         self.solutions = np.zeros(max(1, len(across.passes) * self.nu))
         self.closure = np.zeros(self.off_tree_count * (across.width + 4) + 1)
         self.record = record = ffi.new("mstmm_tangent *")

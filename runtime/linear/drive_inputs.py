@@ -60,7 +60,7 @@ def motions(model: CompiledScene) -> dict[str, Motion]:
     "platform.displacement_acceleration".
     """
     motions_by_name = dict[str, Motion]()
-    for slots, k, _ in _driven(model):
+    for slots, k, _ in _driven_coordinates(model):
         if slots.rates_are_speeds:
             unit, speed = slots.u_units[k], slots.u_names[k]
             named = (
@@ -73,7 +73,7 @@ def motions(model: CompiledScene) -> dict[str, Motion]:
     return motions_by_name
 
 
-def _driven(model: CompiledScene) -> Iterator[tuple[HingeSlots, int, Expression]]:
+def _driven_coordinates(model: CompiledScene) -> Iterator[tuple[HingeSlots, int, Expression]]:
     """Yield (slots of the hinge, index of its coordinate, drive) of all driven coordinates."""
     packed = model.packed_scene
     for tree_index, k in packed.system.driven:
@@ -103,7 +103,7 @@ def followers(model: CompiledScene, name: str, t: float) -> DriveFactors:
     Raises SceneError where a slope depends on time.
     """
     factors, channels = dict[int, float](), model.scene.channels
-    for slots, k, drive in _driven(model):
+    for slots, k, drive in _driven_coordinates(model):
         names = [expression_name.text for expression_name in drive.names]
         if name not in names:
             continue

@@ -46,7 +46,7 @@ def assemble(
     hold, hinges = _held_hinges(compiled, hold), compiled.coordinate_layout.hinges
     if compiled.loop_start is None:
         return Assembly(compiled, t, q.copy(), u.copy())
-    q, u = LoopCalls(compiled.looped, q, t=t).driven(q, u)
+    q, u = LoopCalls(compiled.looped, q, t=t).driven_state(q, u)
     moving = [
         hinge.name for hinge in compiled.packed_scene.user_scene.hinge
         if not hinge.is_weld and hinge.drive is None and u[hinges[hinge.name].u_slice].any()
@@ -71,7 +71,7 @@ def assemble_path(compiled: CompiledScene, q: Array, hold: Sequence[str], branch
         return q.copy()
     state, states = _branch_coordinates(compiled.loop_start, branch), np.empty_like(q)
     for k, row in enumerate(q):
-        target = LoopCalls(compiled.looped, row).driven(row, np.zeros(compiled.nu))[0]
+        target = LoopCalls(compiled.looped, row).driven_state(row, np.zeros(compiled.nu))[0]
         states[k] = state = compiled.loop_start.follow_branch(state, target, hold)
     return states
 

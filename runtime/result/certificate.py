@@ -149,7 +149,7 @@ class Certificate(NotebookDisplay):
         width = max(len(name) for name, _ in rows)
         return "\n".join(f"{name.ljust(width)}  {text}" for name, text in rows)
 
-    def _plain(self) -> str:
+    def _plain_text(self) -> str:
         return str(self)
 
     def _repr_html_(self) -> str:

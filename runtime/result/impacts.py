@@ -80,7 +80,7 @@ class _RigidScene:
 
         The motion must not change the distance to the object of the event.
         """
-        speeds, allowed = self._rigid(row)
+        speeds, allowed = self._rigid_motions(row)
         remaining = is_requested & allowed
         try:
             remaining[remaining] = self._is_constant(
@@ -90,7 +90,7 @@ class _RigidScene:
             remaining[:] = False
         return remaining
 
-    def _rigid(self, row: int) -> tuple[Array, NDArray[np.bool_]]:
+    def _rigid_motions(self, row: int) -> tuple[Array, NDArray[np.bool_]]:
         """Speeds (6, nu) of the scene's rigid motions, and mask (6,) of those permitted.
 
         Permitted are motions that the hinges on the ground allow.

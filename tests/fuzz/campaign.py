@@ -61,11 +61,11 @@ class Campaign:
                 record = json.loads(path.read_text("utf-8"))
                 record["mutants"] = found
 
-                def again(data: Data, turn: int = found[0]) -> Outcome:
+                def try_scene(data: Data, turn: int = found[0]) -> Outcome:
                     return self._try(worker, data, turn)
 
                 effort = EFFORT if kind != HANG else EFFORT_FOR_HANGS
-                record["scene"] = smaller(record["scene"], again, kind, detail, effort)
+                record["scene"] = smaller(record["scene"], try_scene, kind, detail, effort)
                 path.write_text(json.dumps(record, indent=1), "utf-8")
 
     @contextmanager

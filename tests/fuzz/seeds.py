@@ -19,7 +19,7 @@ Data = dict[str, Any]
 def seeds() -> dict[str, Data]:
     """Name -> tables of a scene that compiles, paths of files made absolute."""
     found = {
-        path.parent.name: whole(tomllib.loads(path.read_text("utf-8")), path.parent)
+        path.parent.name: self_contained_scene(tomllib.loads(path.read_text("utf-8")), path.parent)
         for path in sorted(ROOT.glob("examples/*/scene.toml"))
     }
     pages = [*ROOT.glob("docs/howto/*.md"), *ROOT.glob("docs/reference/*.md")]
@@ -32,8 +32,8 @@ def seeds() -> dict[str, Data]:
     return found
 
 
-def whole(data: Data, folder: Path) -> Data:
-    """The scene with files named from anywhere, and with the numbers of signals in it."""
+def self_contained_scene(data: Data, folder: Path) -> Data:
+    """The scene with complete paths of files, and with the numbers of its signals."""
     for body in data.get("elastic", []):
         for key in {"mesh", "matrices"} & body.keys():
             body[key] = str(folder / body[key])

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from tests.reference.compare import drawn, fresh, worst
+from tests.reference.compare import fresh, seeded_scene, worst
 from tests.support.models import compile_scene
 from tests.support.peers.mujoco_peer import TYPES, MujocoPeer
 from tests.support.peers.pinocchio_peer import PinocchioPeer
@@ -14,7 +14,7 @@ from tests.support.peers.pinocchio_peer import PinocchioPeer
 
 @pytest.mark.parametrize("draw", range(25))
 def test_pinocchio_on_random_trees(draw: int, rng: np.random.Generator) -> None:
-    scene, q, u = drawn(draw) if draw < 15 else fresh(rng)
+    scene, q, u = seeded_scene(draw) if draw < 15 else fresh(rng)
     model, peer = compile_scene(scene), PinocchioPeer(scene)
     assert worst(model.accelerations(q, u, t=0.3), peer.accelerations(q, u, 0.3)) < 1e-9
     assert worst(model.mass_matrix(q), peer.mass_matrix(q)) < 1e-11
@@ -25,7 +25,7 @@ def test_pinocchio_on_random_trees(draw: int, rng: np.random.Generator) -> None:
 
 @pytest.mark.parametrize("draw", range(25))
 def test_mujoco_on_random_trees(draw: int, rng: np.random.Generator) -> None:
-    scene, q, u = drawn(draw, types=TYPES) if draw < 15 else fresh(rng, types=TYPES)
+    scene, q, u = seeded_scene(draw, types=TYPES) if draw < 15 else fresh(rng, types=TYPES)
     model, peer = compile_scene(scene), MujocoPeer(scene)
     assert worst(model.accelerations(q, u, t=0.3), peer.accelerations(q, u, 0.3)) < 1e-9
     assert worst(model.mass_matrix(q), peer.mass_matrix(q)) < 1e-11
@@ -35,14 +35,14 @@ def test_mujoco_on_random_trees(draw: int, rng: np.random.Generator) -> None:
     "types", [("pin",), ("ball",), ("universal", "prismatic"), ("cylindrical",)]
 )
 def test_pinocchio_on_long_chains(types: tuple[str, ...]) -> None:
-    scene, q, u = drawn(77, types=types, chain=True, most=40, laws=False, loads=False)
+    scene, q, u = seeded_scene(77, types=types, chain=True, most=40, laws=False, loads=False)
     model, peer = compile_scene(scene), PinocchioPeer(scene)
     assert worst(model.accelerations(q, u), peer.accelerations(q, u)) < 1e-9
 
 
 def test_motion_of_a_spatial_arm_against_mujoco() -> None:
     """Half a second of a chain of pins, universals and balls; MuJoCo by its own RK4."""
-    scene, q, u = drawn(
+    scene, q, u = seeded_scene(
         9, types=("pin", "ball", "universal"), chain=True, most=4, loads=False, laws=False
     )
     peer, step = MujocoPeer(scene), 1e-4

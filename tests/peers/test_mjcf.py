@@ -42,7 +42,7 @@ def mjcf_files() -> Iterator[Path]:
                 yield path
 
 
-def bare(path: Path) -> Any:
+def links_only_model(path: Path) -> Any:
     """MuJoCo's model with the motion of links alone: no tendons, fluids, friction and lifts, and no
     springs of balls, all of which our scenes are told to lack."""
     model = mujoco.MjModel.from_xml_path(str(path))
@@ -63,7 +63,7 @@ def of_links(path: Path) -> ImportedRobot:
 
 def differences(path: Path, rng: np.random.Generator) -> dict[str, float]:
     """How far ours and MuJoCo's differ, in parts of the largest number."""
-    peer, one = bare(path), of_links(path)
+    peer, one = links_only_model(path), of_links(path)
     model = mstmm.compile(one.scene)
     q, u, data, ours, theirs = states(one, model, peer, rng)
     both, whole = np.ix_(ours, ours), np.zeros((peer.nv, peer.nv))
@@ -107,7 +107,7 @@ def test_published_robots_move_as_mujoco_has_them() -> None:
 def test_steps_of_rk4_are_mujocos(name: str, rng: np.random.Generator) -> None:
     """The same method with the same steps gives the same numbers, but for rounding."""
     path, step, steps = next(path for path in mjcf_files() if path.name == name), 1e-3, 200
-    peer, one = bare(path), of_links(path)
+    peer, one = links_only_model(path), of_links(path)
     peer.opt.integrator, peer.opt.timestep = mujoco.mjtIntegrator.mjINT_RK4, step
     model = mstmm.compile(one.scene)
     q, u, data, ours, theirs = states(one, model, peer, rng)
@@ -147,7 +147,7 @@ def test_exact_derivatives_are_the_slopes_of_mujocos_accelerations(
 ) -> None:
     """As near as its differences by two steps are to each other."""
     path = next(path for path in mjcf_files() if path.name == name)
-    peer, one = bare(path), of_links(path)
+    peer, one = links_only_model(path), of_links(path)
     model = mstmm.compile(one.scene)
     q, u, data, ours, theirs = states(one, model, peer, rng)
     found, both = model.derivatives(q, u), np.ix_(ours, ours)

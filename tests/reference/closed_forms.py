@@ -133,11 +133,11 @@ class HeavyTop:
             u = float(self.cosine(np.array(s)))
             return (b - a * u) / (1 - u**2)
 
-        def own(s: float) -> float:
+        def spin_rate(s: float) -> float:
             return self.spin - float(self.cosine(np.array(s))) * rate(s)
 
         phi = quad(rate, 0, t, epsabs=1e-13, epsrel=1e-13, limit=400)[0]
-        psi = quad(own, 0, t, epsabs=1e-13, epsrel=1e-13, limit=400)[0]
+        psi = quad(spin_rate, 0, t, epsabs=1e-13, epsrel=1e-13, limit=400)[0]
         theta = float(np.arccos(self.cosine(np.array(t))))
         x, _, z = np.eye(3)
         turns = [turn(axis, as_jet(angle)).x for axis, angle in ((z, phi), (x, theta), (z, psi))]

@@ -18,7 +18,7 @@ def worst(a: Any, b: Any, floor: float = 1e-300) -> float:
     return float(np.abs(a - b).max() / max(np.abs(b).max(), floor)) if b.size else 0.0
 
 
-def drawn(seed: int, **options: Any) -> Drawn:
+def seeded_scene(seed: int, **options: Any) -> Drawn:
     """Scene, q and u of a seed, which is printed for a failing test."""
     print(f"random_scenes seed = {seed}")
     scene = random_scene(seed, **options)
@@ -27,4 +27,4 @@ def drawn(seed: int, **options: Any) -> Drawn:
 
 def fresh(rng: np.random.Generator, **options: Any) -> Drawn:
     """Scene, q and u of a seed drawn from the run's own generator."""
-    return drawn(int(rng.integers(2**32)), **options)
+    return seeded_scene(int(rng.integers(2**32)), **options)

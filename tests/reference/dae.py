@@ -112,9 +112,9 @@ class Equations:
         bound = _Bound([np.zeros((0, 6 * n))], [np.zeros(0)], [])
         for hinge, rows, rate in fixed:
             lag = -2 * self.baumgarte * rate - self.baumgarte**2 * rows.value
-            bound.add(hinge, _spread(hinge, rows.matrix, n), lag - rows.bias)
+            bound.add(hinge, _spread_columns(hinge, rows.matrix, n), lag - rows.bias)
         for hinge, rows in moving:
-            spread, free = _spread(hinge, rows.matrix, n), _free(hinge)
+            spread, free = _spread_columns(hinge, rows.matrix, n), _free_mask(hinge)
             rotor = np.where(free, laws.reflected_inertia(hinge), 0.0)
             effort = np.where(free, laws.hinge_effort(tree, hinge, q, u, t), 0.0)
             force += spread.T @ (effort - rotor * rows.bias)
@@ -128,7 +128,7 @@ class Equations:
         rates = x[: 6 * n]
         udot = np.zeros(tree.nu)
         for hinge, rows in moving:
-            udot[hinge.u] = _spread(hinge, rows.matrix, n) @ rates + rows.bias
+            udot[hinge.u] = _spread_columns(hinge, rows.matrix, n) @ rates + rows.bias
         return Solution(
             rates.reshape(n, 6), udot, q, u, -x[6 * n :], jacobian, bound.owners, moving, at
         )
@@ -152,7 +152,7 @@ class Equations:
                 if other is hinge:
                     effort = laws.hinge_effort(tree, hinge, q, u, t)
                     effort = effort - laws.reflected_inertia(hinge) * found.udot[hinge.u]
-                    out[j] += rows.matrix[:, 6:].T @ np.where(_free(hinge), effort, 0.0)
+                    out[j] += rows.matrix[:, 6:].T @ np.where(_free_mask(hinge), effort, 0.0)
             arm = at.point(hinge.child, hinge.rp)
             arm = arm - at.point(hinge.child, tree.bodies[hinge.child].center)
             out[j, 3:] -= np.cross(arm, out[j, :3])
@@ -179,7 +179,7 @@ def _motion(tree: Tree, state: Absolute) -> laws.Motion:
     return at
 
 
-def _free(hinge: Hinge) -> Array:
+def _free_mask(hinge: Hinge) -> Array:
     return np.array([text == "free" for text in hinge.drive])
 
 
@@ -193,7 +193,7 @@ def _newton_euler(tree: Tree, at: laws.Motion, external: Array) -> tuple[Array, 
     return scipy.linalg.block_diag(*blocks), force.ravel()
 
 
-def _spread(hinge: Hinge, matrix: Array, n: int) -> Array:
+def _spread_columns(hinge: Hinge, matrix: Array, n: int) -> Array:
     out = np.zeros((len(matrix), 6 * n))
     if hinge.parent >= 0:
         out[:, 6 * hinge.parent : 6 * hinge.parent + 6] = matrix[:, :6]

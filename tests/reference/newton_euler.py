@@ -88,7 +88,7 @@ def motion(scene: Mapping[str, Any] | Tree, q: Array, u: Array) -> laws.Motion:
     return out
 
 
-def _driven(tree: Tree, t: float) -> dict[int, float]:
+def _drive_accelerations(tree: Tree, t: float) -> dict[int, float]:
     rates = {}
     for hinge in tree.hinges:
         for i, text in enumerate(hinge.drive):
@@ -189,7 +189,7 @@ def solve(
     fill_driven(tree, q, u, t)
     at, system = motion(tree, q, u), _System(tree, 0 if coupled is None else len(coupled[1]))
     _newton_euler(tree, at, system, laws.external_wrenches(tree, at, q, u, t))
-    driven = _driven(tree, t)
+    driven = _drive_accelerations(tree, t)
     powers = []
     for j, hinge in enumerate(tree.hinges):
         rel = relative(hinge, q, u)

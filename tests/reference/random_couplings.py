@@ -10,7 +10,7 @@ import scipy.linalg
 from . import couplings
 from .expressions import evaluate
 from .jets import Array
-from .random_loops import random_mechanism, torn
+from .random_loops import closure_jacobian, random_mechanism
 from .tree import SIZES, Tree, read
 
 Scene = dict[str, Any]
@@ -51,7 +51,11 @@ def _coupling(rng: np.random.Generator, scene: Scene, tree: Tree, q: Array) -> S
 
 def _rows(tree: Tree, q: Array, drawn: list[Scene]) -> Array:
     rows = couplings.rows(drawn, tree, q, np.zeros(tree.nu))[0]
-    return np.vstack([torn(tree, q), rows]) if len(tree.hinges) > len(tree.bodies) else rows
+    return (
+        np.vstack([closure_jacobian(tree, q), rows])
+        if len(tree.hinges) > len(tree.bodies)
+        else rows
+    )
 
 
 def _has_independent_rows(tree: Tree, q: Array, drawn: list[Scene]) -> bool:

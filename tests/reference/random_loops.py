@@ -97,13 +97,15 @@ def _close(
 
 def _far_from_singular(tree: Tree, q: Array) -> bool:
     """Whether no row of the loops repeats others, or nearly."""
-    shares = scipy.linalg.svdvals(torn(tree, q))
+    shares = scipy.linalg.svdvals(closure_jacobian(tree, q))
     return bool(shares[-1] > 1e-2 * shares[0]) and tree.nu > len(shares)
 
 
-def torn(tree: Tree, q: Array) -> Array:
-    """How unit speeds tear the loops, six rows a closing hinge: velocities of the outboard ends
-    against those that the closing hinges give them, a column a speed."""
+def closure_jacobian(tree: Tree, q: Array) -> Array:
+    """Velocities of unit speeds between the two sides of the cuts: six rows a closing hinge.
+
+    Those of the outboard ends against those that the closing hinges give them, a column a speed.
+    """
     at = motion(tree, q, np.zeros(tree.nu))
     v, w = (np.zeros((len(tree.bodies) + 1, 3, tree.nu)) for _ in range(2))
 
@@ -135,5 +137,5 @@ def consistent(tree: Tree, q: Array, u: Array) -> Array:
     """The nearest speeds at which no loop is torn apart."""
     if not _closing(tree):
         return u
-    free = scipy.linalg.null_space(torn(tree, q), rcond=1e-10)
+    free = scipy.linalg.null_space(closure_jacobian(tree, q), rcond=1e-10)
     return np.asarray(free @ (free.T @ u))

@@ -7,7 +7,7 @@ import pytest
 
 from tests.reference import dae, kane, laws, random_scenes
 from tests.reference import newton_euler as dense
-from tests.reference.compare import drawn, fresh, worst
+from tests.reference.compare import fresh, seeded_scene, worst
 from tests.reference.constraints import rows_of
 from tests.reference.histories import integrate
 from tests.reference.jets import Array
@@ -18,7 +18,7 @@ SEEDS = range(12)
 
 @pytest.mark.parametrize("seed", [*SEEDS, -1, -2, -3])
 def test_dense_equations_agree_with_multipliers(seed: int, rng: np.random.Generator) -> None:
-    scene, q, u = fresh(rng) if seed < 0 else drawn(seed)
+    scene, q, u = fresh(rng) if seed < 0 else seeded_scene(seed)
     found = dense.solve(scene, q, u, 0.3)
     equations = dae.Equations(scene)
     state = equations.start(q, u)
@@ -32,7 +32,7 @@ def test_dense_equations_agree_with_multipliers(seed: int, rng: np.random.Genera
 
 @pytest.mark.parametrize("kind", [kind for kind in SIZES if kind != "fixed"])
 def test_each_hinge_type_alone_and_in_a_chain(kind: str) -> None:
-    scene, q, u = drawn(5, types=(kind,), chain=True, most=4)
+    scene, q, u = seeded_scene(5, types=(kind,), chain=True, most=4)
     equations = dae.Equations(scene)
     found = dense.solve(scene, q, u, 0.1)
     assert worst(equations.solve(equations.start(q, u), 0.1).udot, found.udot) < 1e-11
@@ -40,7 +40,7 @@ def test_each_hinge_type_alone_and_in_a_chain(kind: str) -> None:
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_mass_matrix_and_inverse_dynamics_give_the_same_accelerations(seed: int) -> None:
-    scene, q, u = drawn(seed)
+    scene, q, u = seeded_scene(seed)
     tree = read(scene)
     found = dense.solve(tree, q, u, 0.3)
     rest = dense.solve(tree, q, u, 0.3, udot=np.zeros(tree.nu)).effort
@@ -78,7 +78,7 @@ def power(tree: Tree, q: Array, u: Array, t: float, step: float = 1e-6) -> float
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_energy_is_constant_without_damping_and_loads(seed: int) -> None:
-    scene, q, u = drawn(seed)
+    scene, q, u = seeded_scene(seed)
     scene["load"] = []
     for spring in scene["spring"]:
         spring["law"].pop("damping")
@@ -101,7 +101,9 @@ def test_momentum_of_a_floating_tree_is_constant() -> None:
 
 
 def test_driven_coordinates_follow_and_their_efforts_agree() -> None:
-    scene, q, u = drawn(2, types=("pin", "cylindrical", "planar", "universal"), chain=True, most=4)
+    scene, q, u = seeded_scene(
+        2, types=("pin", "cylindrical", "planar", "universal"), chain=True, most=4
+    )
     for hinge in scene["hinge"]:
         count = SIZES[hinge["type"]][1]
         hinge["drive"] = ["0.3*sin(2*t)^2 + 0.1*exp(-t)"] + ["free"] * (count - 1)
@@ -116,7 +118,7 @@ def test_driven_coordinates_follow_and_their_efforts_agree() -> None:
 
 @pytest.mark.parametrize("types", [("pin", "ball"), ("universal", "free"), ("cylindrical",)])
 def test_histories_agree(types: tuple[str, ...]) -> None:
-    scene, q, u = drawn(4, types=types, chain=True, most=2, loads=False)
+    scene, q, u = seeded_scene(4, types=types, chain=True, most=2, loads=False)
     times = np.linspace(0.0, 0.03, 3)
     found_q, found_u = integrate(scene, times, q, u, tolerance=1e-10)
     other = dae.simulate(scene, times, q, u, rtol=1e-10, atol=1e-10)
@@ -127,7 +129,7 @@ def test_histories_agree(types: tuple[str, ...]) -> None:
 
 def test_a_wrong_sign_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     """The comparison has teeth: a flipped Coriolis term in one formulation is seen at once."""
-    scene, q, u = drawn(1)
+    scene, q, u = seeded_scene(1)
     good = dense.solve(scene, q, u, 0.3).udot
     equations = dae.Equations(scene)
     monkeypatch.setattr(dae, "rows_of", lambda jet, bias, p: rows_of(jet, -bias, p))

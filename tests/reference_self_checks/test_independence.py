@@ -15,8 +15,8 @@ def test_references_run_without_the_engine() -> None:
     use = (
         "import sys\n"
         "from tests.reference import dae, newton_euler as dense\n"
-        "from tests.reference.compare import drawn\n"
-        "scene, q, u = drawn(1)\n"
+        "from tests.reference.compare import seeded_scene\n"
+        "scene, q, u = seeded_scene(1)\n"
         "dense.solve(scene, q, u)\n"
         "equations = dae.Equations(scene)\n"
         "equations.solve(equations.start(q, u), 0.0)\n"

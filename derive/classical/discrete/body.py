@@ -133,7 +133,7 @@ def _linearised_equations(
     space: Space, modes: int, solved: Equations, letters: SymbolTable
 ) -> tuple[Equation, ...]:
     """Residual at the predictor and Z = A M + C dR/dyd + dR/dy, in inertial axes."""
-    size = space.rigid + modes
+    size = space.rigid_count + modes
     mass, rates, shape = (sp.MatrixSymbol(name, size, size) for name in ("M", "N_b", "L_b"))
     rows, impedance = vector("F_b", size), sp.MatrixSymbol("Z", size, size)
     rotation_rows, axes = sp.eye(size), sp.eye(size)
@@ -176,7 +176,7 @@ def _coordinate_derivative(
     space: Space, modes: int, solved: Equations, letters: SymbolTable
 ) -> Matrix:
     """Derivative columns of r (zero), of the frame's rotation, and of eta."""
-    size, shifts, turns = space.rigid + modes, space.translation_count, space.rotation_count
+    size, shifts, turns = space.rigid_count + modes, space.translation_count, space.rotation_count
     a, mass, rows = vector("a", shifts), sp.MatrixSymbol("M", size, size), vector("F_b", size)
     by_a = Matrix(size, shifts, lambda i, j: mass[i, j])
     force = Matrix(shifts, 1, lambda i, _: rows[i, 0])

@@ -294,7 +294,7 @@ def _elimination_matrices(pair: Pairing) -> tuple[sp.Basic, Matrix]:
             outboard_rotation = outboard_rotation + slopes * vector("eta_pO", modes) * rows_of(
                 state, "1"
             )
-        free[space.translation_count : space.rigid, :] = -slopes.as_explicit()
+        free[space.translation_count : space.rigid_count, :] = -slopes.as_explicit()
         free[size - 1 - modes : size - 1, :] = sp.eye(modes)
     blocks: list[sp.Basic] = [
         rows_of(state, "r") + vector("d_s", space.translation_count) * rows_of(state, "1") + change,

@@ -29,7 +29,7 @@ class Space:
         self.angle = "theta" if planar else "psi"
 
     @property
-    def rigid(self) -> int:
+    def rigid_count(self) -> int:
         """Number of rigid degrees of freedom."""
         return self.translation_count + self.rotation_count
 
@@ -50,7 +50,7 @@ class Space:
 
     def length(self, modes: int) -> int:
         """Number of entries of a state."""
-        return 2 * self.rigid + modes + 1
+        return 2 * self.rigid_count + modes + 1
 
     def moment(self, lever: sp.Basic, force: sp.Basic) -> sp.Basic:
         """lever x force, for a column `lever` and the rows `force` of a state (or a column)."""

@@ -17,7 +17,7 @@ def transfer_equations(statement: BodyStatement) -> tuple[Equation, ...]:
     state = space.state(modes)
     n, size, shifts, turns = (
         state.length,
-        space.rigid + modes,
+        space.rigid_count + modes,
         space.translation_count,
         space.rotation_count,
     )
@@ -30,7 +30,7 @@ def transfer_equations(statement: BodyStatement) -> tuple[Equation, ...]:
     end_displacement = space.rotate(lever, turn)
     if modes:
         end_displacement = end_displacement + sp.MatrixSymbol("P", shifts, modes) * row_block(
-            step, space.rigid, modes
+            step, space.rigid_count, modes
         )
     moment_rows = (
         rows_of(state, "m")
@@ -138,13 +138,13 @@ def _output_end_shapes(statement: BodyStatement) -> tuple[sp.Basic, sp.Basic]:
 def _modal_row_equation(space: Space, modes: int) -> Equation:
     """Modal balance with q_O, m_O of z_I; loads rotate relative to the frame by its rotation."""
     state = space.state(modes)
-    n, size, turns = state.length, space.rigid + modes, space.rotation_count
+    n, size, turns = state.length, space.rigid_count + modes, space.rotation_count
     step = sp.MatrixSymbol("Y", size, n)
     frame_rotation = row_block(step, space.translation_count, turns)
     shapes = sp.MatrixSymbol("P", space.translation_count, modes)
     at_output, at_input = (sp.MatrixSymbol(f"S_{end}", turns, modes) for end in "OI")
     q_p = vector("q_p", space.translation_count)
-    modal_load = row_block(sp.MatrixSymbol("b", size, n), space.rigid, modes) + shapes.T * (
+    modal_load = row_block(sp.MatrixSymbol("b", size, n), space.rigid_count, modes) + shapes.T * (
         sp.MatrixSymbol("Q_O", space.translation_count, n) - space.rotate(q_p, frame_rotation)
     )
     output_moment, input_moment = sp.MatrixSymbol("M_O", turns, n), rows_of(state, "m")
@@ -156,7 +156,7 @@ def _modal_row_equation(space: Space, modes: int) -> Equation:
             modal_load
             + at_output.T * (output_moment - space.rotate(m_p, frame_rotation))
             - at_input.T * (input_moment - space.rotate(m_pi, frame_rotation))
-            + sp.MatrixSymbol("K_g", modes, modes) * row_block(step, space.rigid, modes)
+            + sp.MatrixSymbol("K_g", modes, modes) * row_block(step, space.rigid_count, modes)
         )
     return Equation(
         "modal rows",

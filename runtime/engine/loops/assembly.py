@@ -310,7 +310,11 @@ class Assembly:
 
     def _open_loop_message(self, q: Array, missing: Array) -> str:
         row = int(np.abs(missing).argmax())
-        held_text = f" with {self._names()} fixed" if self.fixed_hinges or self._driven() else ""
+        held_text = (
+            f" with {self._names()} fixed"
+            if self.fixed_hinges or self._driven_hinge_names()
+            else ""
+        )
         return (
             f"scene: {self._subject(row)}: the nearest pose has a gap of "
             f"{self._amount(row, missing, '.7g')}{held_text}; {self._remedy(row, q, missing)}"
@@ -324,10 +328,10 @@ class Assembly:
 
     def _names(self) -> str:
         """Names of the fixed or driven hinges for messages."""
-        names = [f'"{name}"' for name in (*self.fixed_hinges, *self._driven())]
+        names = [f'"{name}"' for name in (*self.fixed_hinges, *self._driven_hinge_names())]
         return ", ".join(names[:_MAX_NAMES]) + (" ..." if names[_MAX_NAMES:] else "")
 
-    def _driven(self) -> list[str]:
+    def _driven_hinge_names(self) -> list[str]:
         packed = self.calls.engine.packed
         hinges = packed.user_scene.hinge if packed.system.driven else ()
         return [
@@ -369,7 +373,9 @@ class Assembly:
         )
         if cause:
             return cause
-        hold_text = ", fix or drive fewer hinges" if self.fixed_hinges or self._driven() else ""
+        hold_text = (
+            ", fix or drive fewer hinges" if self.fixed_hinges or self._driven_hinge_names() else ""
+        )
         return f"correct lengths or axes{hold_text}, or start closer to a closed configuration"
 
     def _amount(self, row: int, missing: Array, digits: str, per: str = "") -> str:

@@ -87,12 +87,13 @@ class _BodyMasses:
         self.cache: dict[tuple[Key, Numbers], tuple[Array, Array]] = {}
 
     def matrix(self, body: int) -> Array:
-        return self._both(body)[0]
+        return self._inertia_and_inverse(body)[0]
 
     def inverse(self, body: int) -> Array:
-        return self._both(body)[1]
+        return self._inertia_and_inverse(body)[1]
 
-    def _both(self, body: int) -> tuple[Array, Array]:
+    def _inertia_and_inverse(self, body: int) -> tuple[Array, Array]:
+        """Inertia matrix of a body, and its pseudo-inverse."""
         body_record = self.distinct[int(self.kind_indices[body])]
         kind = body_record.body, body_record.body_p
         if kind not in self.cache:

@@ -163,7 +163,7 @@ class LoopStart:
         ]  # fmt: skip
         q, u = start_values(packed.scene, packed.layout, packed.flexible)
         calls = LoopCalls(engine, q)
-        q, u = calls.driven(q, u)
+        q, u = calls.driven_state(q, u)
         length = characteristic_length(packed.system)
         try:
             near_q = self._assembly(q, held_hinges).positions(q, _MAX_MISFIT * length)

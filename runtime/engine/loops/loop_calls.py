@@ -122,7 +122,7 @@ class LoopCalls(LoopWorkspace):
             raise engine.evaluation_error(failure, t, q, change)
         return q_moved
 
-    def driven(self, q: Array, u: Array) -> tuple[Array, Array]:
+    def driven_state(self, q: Array, u: Array) -> tuple[Array, Array]:
         """State (q, u) with driven coordinates and speeds set to their prescribed values."""
         engine, q, u, t = self.engine, q.copy(), u.copy(), self.t
         failure = engine.ffi.new("mstmm_failure *")

@@ -44,12 +44,12 @@ class RotorAssembly(Assembly):
                 raise
             rotor_assembly = Assembly(self._with_rotors(), q, self._hinges, t=self._t)
             try:
-                near_q = rotor_assembly.positions(self._shaken(q), *more, **others)
+                near_q = rotor_assembly.positions(self._perturbed_positions(q), *more, **others)
             except LoopClosureError:
                 raise error from None
             return super().positions(near_q, *more, **others)
 
-    def _shaken(self, q: Array) -> Array:
+    def _perturbed_positions(self, q: Array) -> Array:
         """Perturb q: with all links in line the direction of bending is undetermined."""
         change = _RANDOM_CHANGE * np.random.default_rng(0).uniform(-1.0, 1.0, self._engine.nu)
         return self.calls.move(q, change * self.free_speed_mask)

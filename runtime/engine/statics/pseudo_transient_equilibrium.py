@@ -91,7 +91,7 @@ class PseudoTransientEquilibrium:
                 return q
             if sigma <= self._min_sigma and self._is_rounding(q, missing_efforts, self.cancelled):
                 return q  # directions without stiffness move by rounding only
-            next_state = None if step is None else self._ahead(q, step, missing_efforts)
+            next_state = None if step is None else self._state_after_step(q, step, missing_efforts)
             if next_state is None:
                 sigma *= _SIGMA_INCREASE
                 missing_efforts = self.stiffness.residual(q)
@@ -126,7 +126,9 @@ class PseudoTransientEquilibrium:
             return None
         return step / max(1.0, length / _MAX_STEP)
 
-    def _ahead(self, q: Array, step: Array, missing: Array) -> tuple[Array, Array] | None:
+    def _state_after_step(
+        self, q: Array, step: Array, missing: Array
+    ) -> tuple[Array, Array] | None:
         """State q after a step, and the unbalanced efforts there.
 
         None if no valid state is near, if the step ascends, or if it passes the minimum far.  The

@@ -63,7 +63,7 @@ class Direction:
             self.ends.T @ (self.stiffness * modulus_factor[:, None, None] * matrix) @ self.ends
         )
 
-    def rigid(self) -> Array:
+    def rigid_mass(self) -> Array:
         """Mass (6, 6) of the frame in this direction, kg, kg*m, kg*m^2."""
         zeta = np.array([_SMALL_ZETA], dtype=np.complex128)
         matrix = -_evaluate_kernel(self.is_bending, zeta)[0][0].real / _SMALL_ZETA
@@ -146,7 +146,7 @@ def harmonic_beam(
     """
     directions = tuple(_directions(data, body, rotation))
     rigid = _frame_mass(body) - sum(
-        (direction.rigid() for direction in directions), np.zeros((6, 6))
+        (direction.rigid_mass() for direction in directions), np.zeros((6, 6))
     )
     for direction in {name.rstrip("0123456789") for name in body.modes} & _ROTARY_ROW.keys():
         axis = rotation @ np.array(_AXES[direction][1])

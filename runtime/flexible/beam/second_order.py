@@ -41,7 +41,7 @@ class SecondOrder:
         return Rates(self.shapes)
 
     @cached_property
-    def _rigid(self) -> Array:
+    def _rigid_motion_field(self) -> Array:
         return _RigidMotion(self).removed_field(self._frames)
 
     def field_at(self, x: Array, carried: bool = False) -> Array:
@@ -54,7 +54,7 @@ class SecondOrder:
     def sums(self, x: Array, weights: Array, carried: bool = False) -> Array:
         """Sums (p, 6, n, n) of g over sections x (m,) with weights (p, m)."""
         rigid_sums = _rigid_motion_sums(weights.sum(axis=1), weights @ x)
-        rigid = np.tensordot(rigid_sums, self._rigid, axes=(2, 0))
+        rigid = np.tensordot(rigid_sums, self._rigid_motion_field, axes=(2, 0))
         return self.from_root(x, weights, carried) - rigid
 
     def from_root(self, x: Array, weights: Array, carried: bool = False) -> Array:
@@ -81,7 +81,7 @@ class SecondOrder:
         values = self._rates.evaluate(x, a, b)
         if carried and not self.shapes.rotary:
             values[..., 4:] = 0.0
-        rigid = np.stack([((a @ g) * b).sum(axis=1) for g in self._rigid], axis=1)
+        rigid = np.stack([((a @ g) * b).sum(axis=1) for g in self._rigid_motion_field], axis=1)
         return values - np.tensordot(rigid, _rigid_motion_sums(np.ones(len(x)), x), axes=(1, 2))
 
 

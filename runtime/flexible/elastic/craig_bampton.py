@@ -142,7 +142,7 @@ def resolution(reduction: Reduction, release: Release | None) -> float:
     one step of inverse iteration.
     """
     sections, held, model = reduction.sections, reduction.held_port, reduction.sections.model
-    at_origin = model.rigid @ twist_transform(-held.position)
+    at_origin = model.rigid_displacements @ twist_transform(-held.position)
     motions = at_origin @ (np.zeros((6, 0)) if release is None else release.twists)
     shapes = reduction.shapes - at_origin @ reduction.motion(held)
     coupling = motions.T @ model.mass
@@ -167,7 +167,7 @@ def _hinged_shapes(
     The motion of the held section is subtracted.
     """
     at_origin = twist_transform(-held.position)
-    motions = sections.rigid @ (at_origin @ release.twists)
+    motions = sections.rigid_displacements @ (at_origin @ release.twists)
     clamped = sections.clamp([held])
     rows = [sections.rows[port.name].toarray() for port in other_ports]
     rows.append(release.loaded.T @ sections.rows[held.name].toarray())
@@ -181,15 +181,15 @@ def fixed_interface_modes(clamped: Clamped, modes: int, motions: Array | None = 
     With rigid `motions` (w, f) that stay free, the modes are deflections relative to them.
     """
     if not modes:
-        return np.zeros((len(clamped.free), 0))
+        return np.zeros((len(clamped.free_indices), 0))
     model = clamped.sections.model
     if modes > clamped.count:
         raise model.error(
             f"modes: expected at most {clamped.count} fixed-interface modes, as many as there are "
             f"unknowns between the ends, found {modes}; use fewer modes or a finer mesh"
         )
-    mass = clamped.sections.mass.tocsc()[clamped.free][:, clamped.free]
-    is_dense = len(clamped.free) <= _MAX_DENSE_UNKNOWNS or 2 * modes >= clamped.count
+    mass = clamped.sections.mass.tocsc()[clamped.free_indices][:, clamped.free_indices]
+    is_dense = len(clamped.free_indices) <= _MAX_DENSE_UNKNOWNS or 2 * modes >= clamped.count
     relieved_mass = _RelievedMass(mass, *_mass_coupling(clamped, motions))
     squares, vectors = (_dense_modes if is_dense else _sparse_modes)(clamped, relieved_mass, modes)
     usable = int(np.count_nonzero(np.isfinite(squares) & (squares > 0)))
@@ -225,15 +225,17 @@ class _RelievedMass:
 def _mass_coupling(clamped: Clamped, motions: Array | None) -> tuple[Array, Array]:
     """Coupling (f, free) of rigid motions (w, f) with the free unknowns, and inertia (f, f)."""
     if motions is None:
-        return np.zeros((0, len(clamped.free))), np.zeros((0, 0))
+        return np.zeros((0, len(clamped.free_indices))), np.zeros((0, 0))
     momentum = np.asarray((clamped.sections.mass @ motions).T)
-    return momentum[:, clamped.free], momentum @ motions
+    return momentum[:, clamped.free_indices], momentum @ motions
 
 
 def _dense_modes(clamped: Clamped, mass: _RelievedMass, modes: int) -> tuple[Array, Array]:
     from scipy import linalg
 
-    stiffness = clamped.sections.stiffness.tocsc()[clamped.free][:, clamped.free].toarray()
+    stiffness = clamped.sections.stiffness.tocsc()[clamped.free_indices][
+        :, clamped.free_indices
+    ].toarray()
     rows = clamped.rows
     basis = np.eye(len(stiffness)) if rows is None else linalg.null_space(rows.toarray())
     m, k = basis.T @ mass.dense() @ basis, basis.T @ stiffness @ basis
@@ -254,8 +256,8 @@ def _dense_modes(clamped: Clamped, mass: _RelievedMass, modes: int) -> tuple[Arr
 def _sparse_modes(clamped: Clamped, mass: _RelievedMass, modes: int) -> tuple[Array, Array]:
     from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 
-    size, solve = len(clamped.free), clamped.inverse
-    stiffness = clamped.sections.stiffness.tocsc()[clamped.free][:, clamped.free]
+    size, solve = len(clamped.free_indices), clamped.inverse
+    stiffness = clamped.sections.stiffness.tocsc()[clamped.free_indices][:, clamped.free_indices]
 
     def inverse(load: Array) -> Array:
         return solve(load.reshape(size, 1), None).reshape(size)
@@ -278,8 +280,8 @@ def _sparse_modes(clamped: Clamped, mass: _RelievedMass, modes: int) -> tuple[Ar
 
 def without_momentum(model: ElasticModel, shapes: Array) -> Array:
     """Shapes without momentum (mean frame): int rho phi = 0 and int rho r0 x phi = 0."""
-    parts = np.linalg.solve(model.inertia, model.rigid.T @ (model.mass @ shapes))
-    return np.asarray(shapes - model.rigid @ parts)
+    parts = np.linalg.solve(model.inertia, model.rigid_displacements.T @ (model.mass @ shapes))
+    return np.asarray(shapes - model.rigid_displacements @ parts)
 
 
 def orthogonalise(model: ElasticModel, shapes: Array) -> tuple[Array, Array]:

@@ -76,7 +76,7 @@ def _correct_moments(
     model: ElasticModel, shapes: Array, E: Array, F: Array, how: str
 ) -> FieldMoments:
     """Moments with all parts replaced that rigid-body columns and shapes give exactly."""
-    inertia, momentum = model.inertia, model.rigid.T @ (model.mass @ shapes)
+    inertia, momentum = model.inertia, model.rigid_displacements.T @ (model.mass @ shapes)
     rotary = inertia[3:, 3:]
     second = np.trace(rotary) / 2 * np.eye(3) - rotary
     first = np.array([inertia[2, 4], inertia[0, 5], inertia[1, 3]]) * [-1, -1, -1]

@@ -64,14 +64,14 @@ class ElasticModel:
         return int(self.mass.shape[0] // len(self.nodes))
 
     @cached_property
-    def rigid(self) -> Array:
-        """Unknowns (u, 6) in unit translations, then unit rotations about the origin."""
+    def rigid_displacements(self) -> Array:
+        """Unknowns T (u, 6) in unit translations, then unit rotations about the origin."""
         return rigid_columns(self.nodes, self.unknowns)
 
     @cached_property
     def inertia(self) -> Array:
-        """Spatial inertia (6, 6) about the origin, rigid^T mass rigid."""
-        return np.asarray(self.rigid.T @ (self.mass @ self.rigid))
+        """Spatial inertia (6, 6) about the origin, T^T mass T with T the rigid displacements."""
+        return np.asarray(self.rigid_displacements.T @ (self.mass @ self.rigid_displacements))
 
     @property
     def size(self) -> float:

@@ -50,7 +50,7 @@ def second_order_moments(reduction: Reduction, ports: list[Port]) -> SecondOrder
     moving = [p for p in ports if reduction.frame == "mean" or p is not reduction.held_port]
     loads = np.hstack([_body_loads(reduction), *(_port_loads(reduction, p) for p in moving)])
     if reduction.frame == "mean":
-        loads = reduction.sections.relieve_inertia(loads, reduction.sections.rigid)
+        loads = reduction.sections.relieve_inertia(loads, reduction.sections.rigid_displacements)
     static = reduction.sections.clamp([reduction.held_port]).statics(loads)
     stiffnesses = model.stress(reduction.sections.expand @ static, reduction.shapes)
     stiffnesses = (stiffnesses + stiffnesses.transpose(0, 2, 1)) / 2
@@ -68,7 +68,7 @@ def truncation(reduction: Reduction, ports: list[Port]) -> Truncation:
     inertia = -sections.expand.T @ (sections.model.mass @ shapes)
     wrenches = [sections.rows[port.name].toarray().T for port in ports]
     loads = np.hstack([*wrenches, _body_loads(reduction)[:, 3:], inertia])
-    loads = sections.relieve_inertia(loads, sections.rigid)
+    loads = sections.relieve_inertia(loads, sections.rigid_displacements)
     displacements = sections.clamp([reduction.held_port]).statics(loads)
     modal_loads = sections.unknowns(shapes).T @ loads
     modal_stiffness = sections.model.inertia[0, 0] * reduction.frequencies**2

@@ -27,7 +27,7 @@ class Sections:
     ports: tuple[Port, ...]
 
     @cached_property
-    def _stiff(self) -> list[Port]:
+    def _stiff_ports(self) -> list[Port]:
         return [port for port in self.ports if port.stiff]
 
     @cached_property
@@ -35,7 +35,7 @@ class Sections:
         """Sparse matrix T (u, w) from the unknowns w to all unknowns u."""
         from scipy import sparse
 
-        model, stiff = self.model, self._stiff
+        model, stiff = self.model, self._stiff_ports
         port_unknowns = [port.unknowns(model) for port in stiff]
         rest = np.setdiff1d(np.arange(model.mass.shape[0]), np.concatenate([*port_unknowns, []]))
         rows, columns, values = (
@@ -70,7 +70,7 @@ class Sections:
         width, rows = self.expand.shape[1], {}
         for port in self.ports:
             if port.stiff:
-                indices = 6 * self._stiff.index(port) + np.arange(6)
+                indices = 6 * self._stiff_ports.index(port) + np.arange(6)
                 unit = (np.ones(6), (np.arange(6), indices))
                 rows[port.name] = sparse.csr_array(unit, shape=(6, width))
             else:
@@ -79,23 +79,23 @@ class Sections:
         return rows
 
     @cached_property
-    def rigid(self) -> Array:
+    def rigid_displacements(self) -> Array:
         """Unit translations, then unit rotations about the origin, as columns (w, 6)."""
         model, columns = self.model, np.zeros((self.expand.shape[1], 6))
-        port_unknowns = [port.unknowns(model) for port in self._stiff]
-        for k, port in enumerate(self._stiff):
+        port_unknowns = [port.unknowns(model) for port in self._stiff_ports]
+        for k, port in enumerate(self._stiff_ports):
             columns[6 * k : 6 * k + 6] = twist_transform(port.position)
         rest = np.setdiff1d(np.arange(model.mass.shape[0]), np.concatenate([*port_unknowns, []]))
-        columns[6 * len(self._stiff) :] = model.rigid[rest.astype(int)]
+        columns[6 * len(self._stiff_ports) :] = model.rigid_displacements[rest.astype(int)]
         return columns
 
     def unknowns(self, shapes: Array) -> Array:
         """Unknowns (w, k) of displacements (u, k) whose rigid ports move as sections."""
-        port_unknowns = [port.unknowns(self.model) for port in self._stiff]
+        port_unknowns = [port.unknowns(self.model) for port in self._stiff_ports]
         rest = np.setdiff1d(np.arange(len(shapes)), np.concatenate([*port_unknowns, []]))
         motions = [
             np.linalg.lstsq(port.section(self.model), shapes[indices], rcond=None)[0]
-            for port, indices in zip(self._stiff, port_unknowns, strict=True)
+            for port, indices in zip(self._stiff_ports, port_unknowns, strict=True)
         ]
         return np.concatenate([*motions, shapes[rest]])
 
@@ -129,7 +129,7 @@ class Clamped:
     held_ports: tuple[Port, ...]
 
     @cached_property
-    def free(self) -> Integers:
+    def free_indices(self) -> Integers:
         """Indices of the unknowns w except sections of held rigid ports."""
         stiff = [port for port in self.sections.ports if port.stiff]
         fixed = [6 * stiff.index(port) + np.arange(6) for port in self.held_ports if port.stiff]
@@ -141,12 +141,12 @@ class Clamped:
         from scipy import sparse
 
         soft = [self.sections.rows[port.name] for port in self.held_ports if not port.stiff]
-        return sparse.vstack(soft).tocsc()[:, self.free] if soft else None
+        return sparse.vstack(soft).tocsc()[:, self.free_indices] if soft else None
 
     @property
     def count(self) -> int:
         """Number of independent free unknowns."""
-        return len(self.free) - (0 if self.rows is None else self.rows.shape[0])
+        return len(self.free_indices) - (0 if self.rows is None else self.rows.shape[0])
 
     @cached_property
     def inverse(self) -> Callable[[Array, Array | None], Array]:
@@ -154,7 +154,7 @@ class Clamped:
         from scipy import sparse
         from scipy.sparse.linalg import splu
 
-        free, rows = self.free, self.rows
+        free, rows = self.free_indices, self.rows
         matrix = self.sections.stiffness.tocsc()[free][:, free]
         # Scale the rows to the size of the stiffness, so that pivoting does not start with them.
         scale = float(np.max(np.abs(matrix.diagonal())))
@@ -183,21 +183,21 @@ class Clamped:
     def full(self, displacements: Array) -> Array:
         """Unknowns (w, k) from free displacements (free, k), with held sections at zero."""
         unknowns = np.zeros((self.sections.expand.shape[1], displacements.shape[1]))
-        unknowns[self.free] = displacements
+        unknowns[self.free_indices] = displacements
         return unknowns
 
     def statics(self, loads: Array) -> Array:
         """Static displacements (w, k) under loads (w, k), with held sections at zero."""
-        return self.full(self.inverse(loads[self.free], None))
+        return self.full(self.inverse(loads[self.free_indices], None))
 
     def constraint_shapes(self, port: Port) -> Array:
         """Static displacements (w, 6) in unit motions of one held section, the others at zero."""
         sections = self.sections
         if port.stiff:
             section_motion = sections.rows[port.name].T.toarray()
-            loads = -(sections.stiffness @ section_motion)[self.free]
+            loads = -(sections.stiffness @ section_motion)[self.free_indices]
             return section_motion + self.full(self.inverse(loads, None))
         soft = [p.name for p in self.held_ports if not p.stiff]
         unit = np.zeros((6 * len(soft), 6))
         unit[6 * soft.index(port.name) :][:6] = np.eye(6)
-        return self.full(self.inverse(np.zeros((len(self.free), 6)), unit))
+        return self.full(self.inverse(np.zeros((len(self.free_indices), 6)), unit))

@@ -169,7 +169,7 @@ def _check_equal_masses(model: ElasticModel) -> None:
 
 
 def _check_rigid_motions(model: ElasticModel) -> None:
-    stiffness, motions = model.stiffness, model.rigid
+    stiffness, motions = model.stiffness, model.rigid_displacements
     force = np.max(np.abs(stiffness @ motions), axis=0)
     terms = np.max(abs(stiffness) @ np.abs(motions), axis=0)
     share = force / np.where(terms > 0, terms, 1.0)

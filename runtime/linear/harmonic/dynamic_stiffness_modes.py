@@ -121,7 +121,7 @@ class _Counter:
         size = sum(beam.size**2 for beam in beams.beams) + engine.nu
         self.max_batch = max(4, _BATCH // max(1, size))
 
-    def below(self, omega: Array) -> Integers:
+    def count_below(self, omega: Array) -> Integers:
         """Mode count J (k,) below omega (k,), rad/s."""
         parts = [omega[k : k + self.max_batch] for k in range(0, len(omega), self.max_batch)]
         return np.concatenate([self._count_modes(part) for part in parts])
@@ -142,19 +142,19 @@ class _Counter:
         if (self.response.count_negative(np.array([low**2])) > 0).any():
             raise SceneError("exact modes: this state is unstable; use a stable state")
         high = self.unit
-        while self.below(np.array([high]))[0] < count:
+        while self.count_below(np.array([high]))[0] < count:
             high *= 2
             if high > _FASTEST * self.unit:
                 raise SceneError(
                     f"count = {count}: the scene has no more than "
-                    f"{self.below(np.array([high]))[0]} modes; request fewer"
+                    f"{self.count_below(np.array([high]))[0]} modes; request fewer"
                 )
         mode_numbers = np.arange(1, count + 1)
         lower, upper = np.full(count, low), np.full(count, high)
-        still = self.below(np.array([low]))[0]
+        still = self.count_below(np.array([low]))[0]
         while (upper - lower > _CLOSE * upper).any():
             middle, which = np.unique((lower + upper) / 2, return_inverse=True)
-            reached = self.below(middle)[which] >= mode_numbers
+            reached = self.count_below(middle)[which] >= mode_numbers
             lower, upper = (
                 np.where(reached, lower, middle[which]),
                 np.where(reached, middle[which], upper),

@@ -51,10 +51,10 @@ def stiffer(linear: LinearEquations, losses: Losses) -> LoopedEngine:
     system, lossy = engine.packed.system, loss_factor_lookup(model, losses)
     bodies = tuple(_stiffer_shapes(model, run, lossy) for run in system.bodies)
 
-    def stiff(law: LawNumbers, body: int) -> LawNumbers:
+    def stiffer_body_law(law: LawNumbers, body: int) -> LawNumbers:
         return _stiffer_law(law, lossy(engine.hinge_name(body)))
 
-    laws = tuple(law for run in system.laws for law in change_laws(run, stiff))
+    laws = tuple(law for run in system.laws for law in change_laws(run, stiffer_body_law))
     forces = tuple(
         _stiffer_force(engine, force, state, lossy(element.name))
         for force, element in zip(system.forces, engine.packed.scene.forces, strict=True)

@@ -38,7 +38,7 @@ class Frames:
     rates: Mapping[str, Array]
     generator: Array
 
-    def twice(self) -> Array:
+    def state_generator(self) -> Array:
         """Generator (2 nu, 2 nu), 1/s, of perturbations and speeds."""
         return np.asarray(block_diag(self.generator, self.generator))
 

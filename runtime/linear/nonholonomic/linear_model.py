@@ -173,7 +173,7 @@ class NonholonomicLinear(Linear):
         """State matrix (n + m, n + m)."""
         slopes, turned, basis = self._slopes, self._state_rotation, self._basis
         both = np.block([[slopes["rate_q"], slopes["rate_u"]], [slopes["q"], slopes["u"]]])
-        rates = self.frames.twice() @ basis + turned @ both @ (turned.T @ basis)
+        rates = self.frames.state_generator() @ basis + turned @ both @ (turned.T @ basis)
         return np.asarray(rates[self._rolling.state_indices])
 
     @cached_property
@@ -355,7 +355,7 @@ class NonholonomicLinear(Linear):
     def _later(self) -> NonholonomicLinear:
         """Linear model at the later state of the motion, in the same frames."""
         model, own = self.model, self._rolling
-        state, rotation = _ahead(self)
+        state, rotation = _later_state(self)
         rolling = rolling_at(
             model, state, None, self.dry, (own.independent_indices, own.speed_indices)
         )
@@ -427,7 +427,7 @@ def nonholonomic_at(bare: Linear, slopes: Slopes) -> NonholonomicLinear:
     )  # fmt: skip
 
 
-def _ahead(linear: NonholonomicLinear) -> tuple[State, Array]:
+def _later_state(linear: NonholonomicLinear) -> tuple[State, Array]:
     """Later state of the motion, at the same independent speeds in the frames.
 
     Also returns the rotation (nu, nu) from the body axes at that state to the frames.

@@ -129,7 +129,7 @@ def eigenvalues(values: Complex, path: str | Path | None) -> Any:
     growing = values.real > 0
     for some, colour in ((~growing, _BLUE), (growing, _RED)):
         axis.plot(values[some].real, values[some].imag, "x", color=colour, ms=7, mew=1.6)
-    wide = _spread(values.imag) > _SPREAD
+    wide = _frequency_spread(values.imag) > _SPREAD
     (_use_log_axes if wide else _widen_limits)(axis, values.real, values.imag)
     for k in _separate_indices(axis, values[:_NUMBERED]):
         position = values[k].real, values[k].imag
@@ -145,7 +145,7 @@ def eigenvalues(values: Complex, path: str | Path | None) -> Any:
     return drawing
 
 
-def _spread(imaginary: Array) -> float:
+def _frequency_spread(imaginary: Array) -> float:
     """Ratio of the largest to the smallest positive frequency."""
     positive = imaginary[imaginary > 0]
     return float(positive.max() / positive.min()) if len(positive) else 1.0

@@ -28,7 +28,7 @@ from mstmm.safe_text import abbreviate_names
 from .blades import find_blades
 from .displacements import displacements
 from .frame_transform import FrameTransform
-from .later_equations import SAME, ahead, later
+from .later_equations import SAME, later, later_state
 
 if TYPE_CHECKING:
     from ..linear_equations import LinearEquations
@@ -47,7 +47,7 @@ def frame_of(linear: LinearEquations) -> str:
 def _is_rotating(linear: LinearEquations) -> bool:
     if linear.frame_transform is not None or not len(linear) or not linear.state.u.any():
         return False
-    now, then = (displacements(linear, state) for state in (linear.state, ahead(linear)))
+    now, then = (displacements(linear, state) for state in (linear.state, later_state(linear)))
     return bool(np.abs(then - now).max() > _ALIKE * np.abs(now).max(initial=0))
 
 

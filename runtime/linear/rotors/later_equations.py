@@ -24,7 +24,7 @@ _AHEAD = 0.1
 
 def later(linear: LinearEquations) -> LinearEquations:
     """Linear equations at the later state of the motion."""
-    state, loops = ahead(linear), linear.constrained_motion
+    state, loops = later_state(linear), linear.constrained_motion
     loops = None if loops is None else loops.at_state(state)
     turning = linear.rate_matrix if loops is None else loops.rate_matrix
     carrying = linear.frame_transform
@@ -40,7 +40,7 @@ def later(linear: LinearEquations) -> LinearEquations:
     )
 
 
-def ahead(linear: LinearEquations) -> State:
+def later_state(linear: LinearEquations) -> State:
     """Later state of the motion, at the same speeds."""
     model, state = linear.model, linear.state
     engine, memory = model.looped, model.looped.start_memory()

@@ -16,7 +16,10 @@ def bushing_numbers(frames: Frames, bushing: Bushing) -> ForceNumbers:
     rest = _sum(position, rotate(bushing_axes, bushing.rest.position))
     to_body, to_axes, to_position = _end(frames, bushing, bushing.to)
     to_axes = product(to_axes, transpose(bushing.rest.rotation))
-    ends = ((body, _flat(bushing_axes), rest), (to_body, _flat(to_axes), to_position))
+    ends = (
+        (body, _row_major_entries(bushing_axes), rest),
+        (to_body, _row_major_entries(to_axes), to_position),
+    )
     return ForceNumbers(("force", bushing.element), ends, bushing.numbers, None)
 
 
@@ -31,5 +34,5 @@ def _sum(a: Vector, b: Vector) -> Vector:
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
 
 
-def _flat(matrix: Matrix) -> Numbers:
+def _row_major_entries(matrix: Matrix) -> Numbers:
     return (*matrix[0], *matrix[1], *matrix[2])

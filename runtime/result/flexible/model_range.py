@@ -132,7 +132,7 @@ def _model_range(
 ) -> ModelRange:
     full_motion = flexible.motion(name)
     body, finite = full_motion.body, _is_squarable(full_motion.eta)
-    finite_motion = full_motion.some(
+    finite_motion = full_motion.select_samples(
         finite
     )  # also where the rest of the motion cannot be evaluated
     finite &= (
@@ -141,7 +141,7 @@ def _model_range(
         & _is_squarable(full_motion.acceleration)
     )
     valid_samples = np.flatnonzero(finite)
-    energies = strain_energy(full_motion.some(valid_samples))
+    energies = strain_energy(full_motion.select_samples(valid_samples))
     picked_indices = np.unique(
         np.linspace(0, len(valid_samples) - 1, min(MAX_SAMPLES, len(valid_samples))).astype(int)
     )
@@ -150,7 +150,7 @@ def _model_range(
         if len(valid_samples)
         else picked_indices
     )
-    motion, samples = full_motion.some(valid_samples), valid_samples[picked_indices]
+    motion, samples = full_motion.select_samples(valid_samples), valid_samples[picked_indices]
     slope, shapes = e.max_slope(finite_motion), body.shapes
     first_frequency = float(modal_frequencies(body)[0])
     has_section_loads = shapes is not None and name not in flexible.unbalanced
@@ -216,7 +216,7 @@ def _load_ratio_bounds(
                 port: (force[part], moment[part]) for port, (force, moment) in loads.items()
             }
             k_g = e.stiffness_from_loads(
-                motion.some(part), flexible.gravity, end_loads, second_order_moments
+                motion.select_samples(part), flexible.gravity, end_loads, second_order_moments
             )
             ratios.append(e.load_ratios(motion.body.K, k_g))
     except np.linalg.LinAlgError:  # overflow of loads
@@ -233,11 +233,11 @@ def _section_estimates(
     The truncated part of the bending energy, `lateral_load_ratio`, and the deformation in
     directions without shape functions.
     """
-    motion = flexible.motion(name).some(some)
+    motion = flexible.motion(name).select_samples(some)
     inboard_x = flexible.inboard_position(name)
     x, weights = quadrature_rule(motion.shapes, inboard_x)
-    points = [p.some(some) for p in flexible.point_loads(name)]
-    lines = [line.some(some) for line in flexible.line_loads(name)]
+    points = [p.select_samples(some) for p in flexible.point_loads(name)]
+    lines = [line.select_samples(some) for line in flexible.line_loads(name)]
     force, moment = section_loads(motion, x, flexible.gravity, inboard_x, points, lines)
     length = motion.shapes.length if line is None else line
     return (
@@ -277,7 +277,7 @@ def missed_deflection(flexible: FlexibleBodies, name: str, some: NDArray[np.int6
     Under the loads on the ends, the spin of the body and the inertia of its shape functions, taken
     where these are strained most; None without any.
     """
-    motion = flexible.motion(name).some(some)
+    motion = flexible.motion(name).select_samples(some)
     truncation, inboard_end = motion.body.truncation, flexible.inboard_end(name)
     energies = strain_energy(motion)
     if truncation is None or not len(some) or not energies.max() > 0:

@@ -54,7 +54,7 @@ class Motion:
     acceleration: Array
     angular_acceleration: Array
 
-    def some(self, samples: Any) -> Motion:
+    def select_samples(self, samples: Any) -> Motion:
         """Motion at some of the samples: a slice or indices."""
         arrays = {k: v[samples] for k, v in vars(self).items() if isinstance(v, np.ndarray)}
         sampled = {name: arrays[name] for name in _ARRAYS}

@@ -47,7 +47,7 @@ class PointLoad:
     force: Array
     moment: Array
 
-    def some(self, samples: Any) -> PointLoad:
+    def select_samples(self, samples: Any) -> PointLoad:
         """Load at some of the samples."""
         return PointLoad(self.x, self.force[samples], self.moment[samples])
 
@@ -64,7 +64,7 @@ class LineLoad:
     force: Array
     moment: Array
 
-    def some(self, samples: Any) -> LineLoad:
+    def select_samples(self, samples: Any) -> LineLoad:
         """Load at some of the samples."""
         return LineLoad(self.first, self.last, self.force[samples], self.moment[samples])
 
@@ -91,10 +91,12 @@ def section_loads(
     for first in range(0, len(motion.t), rows):
         samples = slice(first, first + rows)
         sampled_points, sampled_lines = (
-            [p.some(samples) for p in points],
-            [p.some(samples) for p in lines],
+            [p.select_samples(samples) for p in points],
+            [p.select_samples(samples) for p in lines],
         )
-        sums = _PanelSums(motion.some(samples), edges, gravity, sampled_points, sampled_lines)
+        sums = _PanelSums(
+            motion.select_samples(samples), edges, gravity, sampled_points, sampled_lines
+        )
         force[samples], moment[samples] = sums.section_loads(positions, held)
     return force, moment
 

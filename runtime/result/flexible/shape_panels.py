@@ -91,7 +91,7 @@ def _strip_panel(result: Record, bodies: list[str] | None) -> ShapePanel:
 
 
 def _body_strip(result: Record, name: str, some: NDArray[np.int64]) -> Strip:
-    motion = result._flexible.motion(name).some(some)
+    motion = result._flexible.motion(name).select_samples(some)
     body = motion.body
     if body.shapes is not None:
         x = np.linspace(0.0, body.shapes.length, _STATION_COUNT)
@@ -117,7 +117,7 @@ def _rigid_lines(result: Record, some: NDArray[np.int64]) -> list[Array]:
 
 
 def _draw_body_deflections(result: Record, name: str, figure: Any, axis: Any) -> None:
-    motion = result._flexible.motion(name).some(_drawn_samples(result))
+    motion = result._flexible.motion(name).select_samples(_drawn_samples(result))
     length = observe.shapes_of(motion.body, "deflection").length
     x = np.linspace(0.0, length, _STATION_COUNT)
     displacement = observe.deflection(motion, x)

@@ -67,7 +67,7 @@ def elastic_surface(
 
 def motion_at(run: Record, name: str, when: FrameTimes, poses: Poses) -> observed.Motion:
     """Motion of a body at the frame times; rates that are not drawn are zero."""
-    motion = run._flexible.motion(name).some(when.samples)
+    motion = run._flexible.motion(name).select_samples(when.samples)
     eta = when.interpolate_hermite(motion.eta, motion.etad)
     zero_rates, zero_vectors = np.zeros_like(eta), np.zeros((len(eta), 3))
     return observed.Motion(

@@ -77,7 +77,7 @@ class _SceneBuilder:
         self.notes = () if drawn else (f"more than {_MAX_HINGES} hinges: they are not drawn",)
 
     def stage(self, title: str) -> SceneGraph:
-        solids = [*self._shapes(), *self._rigid(), *self._joints(), *self._feet()]
+        solids = [*self._shapes(), *self._rigid_bodies(), *self._joints(), *self._feet()]
         self.poses |= dict(self.load_arrows.poses())
         scene_graph = SceneGraph(
             title=title, times=self.frame_times.times, speed=self.frame_times.speed,
@@ -126,7 +126,7 @@ class _SceneBuilder:
     def _colour(self, name: str) -> Colour:
         return _BODY_COLOURS[self.names.index(name) % len(_BODY_COLOURS)]
 
-    def _rigid(self) -> Iterator[Solid]:
+    def _rigid_bodies(self) -> Iterator[Solid]:
         flexible_bodies = self.run.model.flexible_bodies
         names_with_geometry = {
             name for name, body in flexible_bodies.items() if body.shapes or body.skin

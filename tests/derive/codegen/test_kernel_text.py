@@ -15,7 +15,7 @@ from mstmm.ir.element_spec import ElementSpec
 from mstmm.ir.graph import Graph
 from mstmm.ir.interpreter import GuardFailure, evaluate_floats
 from mstmm.ir.tape import compile_tape
-from tests.support.kernels.c_library import CLibrary, build, same
+from tests.support.kernels.c_library import CLibrary, are_same_numbers, build
 from tests.support.kernels.random_kernels import element
 
 SIZES = (0, 1, 3, 17)
@@ -69,7 +69,7 @@ def library(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFac
     return build(tmp_path_factory.mktemp("modal"), spec, flags=request.param)
 
 
-def drawn(n: int, rng: np.random.Generator) -> dict[str, list[float]]:
+def random_kernel_inputs(n: int, rng: np.random.Generator) -> dict[str, list[float]]:
     half = rng.normal(size=(n, n))
     return {
         "scale": [1.5],
@@ -82,19 +82,19 @@ def drawn(n: int, rng: np.random.Generator) -> dict[str, list[float]]:
 
 @pytest.mark.parametrize("n", SIZES)
 def test_c_equals_floats(n: int, library: CLibrary, rng: np.random.Generator) -> None:
-    inputs = drawn(n, rng)
+    inputs = random_kernel_inputs(n, rng)
     outcome = library.call("modal", "modal", inputs, n)
     wanted = evaluate_floats(KERNEL, inputs, n)
     assert outcome.code == 0
     assert len(outcome.outputs.pop("work")) == n * n
     assert list(outcome.outputs) == list(wanted)
     for name, row in wanted.items():
-        assert same(outcome.outputs[name], row), name
+        assert are_same_numbers(outcome.outputs[name], row), name
 
 
 @pytest.mark.parametrize("n", SIZES)
 def test_fifty_digits_solve_the_equations(n: int, rng: np.random.Generator) -> None:
-    inputs = drawn(n, rng)
+    inputs = random_kernel_inputs(n, rng)
     found = {name: np.array(row) for name, row in evaluate(KERNEL, inputs, 50, n).items()}
     matrix = np.array([mpmath.mpf(entry) for entry in inputs["M"]], dtype=object).reshape(n, n)
     right = np.array(inputs["F"]).reshape(n, 3)
@@ -111,7 +111,7 @@ def test_a_vanishing_pivot_leaves_with_its_code(
     library: CLibrary, rng: np.random.Generator
 ) -> None:
     for spoiled in (0.0, -1.0, np.nan):
-        inputs = drawn(3, rng)
+        inputs = random_kernel_inputs(3, rng)
         inputs["M"][4] = spoiled
         assert library.call("modal", "modal", inputs, 3).code == NOT_DEFINITE
         with pytest.raises(GuardFailure, match="modal mass is not positive definite") as caught:
@@ -159,7 +159,7 @@ def test_a_tape_has_no_loops() -> None:
 
 def test_the_size_must_be_given(rng: np.random.Generator) -> None:
     with pytest.raises(ValueError, match="give n, the run-time size 'n'"):
-        evaluate(KERNEL, drawn(2, rng))
+        evaluate(KERNEL, random_kernel_inputs(2, rng))
 
 
 def test_arrays_called_like_the_loop_and_the_work_array(

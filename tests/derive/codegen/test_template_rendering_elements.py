@@ -22,7 +22,7 @@ from mstmm.ir.json_format import element_from_json
 from mstmm.ir.statements import NEGATIVE_DETERMINANT
 from mstmm.ir.tape import compile_tape
 from mstmm.runtime.kernels import prebuilt_kernels
-from tests.support.kernels.c_library import CLibrary, Outcome, build, same
+from tests.support.kernels.c_library import CLibrary, Outcome, are_same_numbers, build
 from tests.support.paths import ROOT
 
 GENERATED = ROOT / "generated"
@@ -73,7 +73,7 @@ def test_manifest_and_descriptors_agree(library: CLibrary) -> None:
 SIZE = 3
 
 
-def drawn(port: Port, rng: np.random.Generator, special: bool) -> list[float]:
+def random_values(port: Port, rng: np.random.Generator, special: bool) -> list[float]:
     """Values a kernel could meet: rotations for 3 x 3, definite inertias for 21 numbers and for
     modal mass matrices, no negative inertia of rotors.
 
@@ -118,7 +118,7 @@ def agree(kernel: KernelIR, inputs: dict[str, list[float]], found: Iterable[Outc
     for outcome in outcomes:
         assert outcome.code in (0, NEGATIVE_DETERMINANT)  # behind all results
         for name, row in floats.items():
-            assert same(outcome.outputs[name], row), name
+            assert are_same_numbers(outcome.outputs[name], row), name
     if all(np.isfinite(row).all() for row in floats.values()):
         for name, limits in rounding_bounds(kernel, inputs, n).items():
             for got, (value, bound) in zip(outcomes[0].outputs[name], limits, strict=True):
@@ -132,7 +132,7 @@ def compare(library: CLibrary, stem: str, spec: ElementSpec, rng: np.random.Gene
     for kernel in spec.kernels:
         passed = 0
         for draw in range(60):  # many draws fail a guard, which has to fail alike in all three
-            inputs = {port.name: drawn(port, rng, draw == 0) for port in kernel.inputs}
+            inputs = {port.name: random_values(port, rng, draw == 0) for port in kernel.inputs}
             found = ways(library, stem, kernel, inputs, kernel.name in compiled)
             passed += agree(kernel, inputs, found)
             if draw >= 3 and passed:

@@ -145,14 +145,14 @@ def accelerations(q: Array, u: Array) -> Array:
     def displaced_poses(i: int, k: int, by: float) -> list[Pose]:
         return [displaced_pose(pose, k, by) if i == j else pose for j, pose in enumerate(poses)]
 
-    def along(i: int, k: int) -> Array:
+    def unit_speed_rates(i: int, k: int) -> Array:
         """Rate of x and relative angular velocity in the bushing's axes for a unit speed."""
         rate: Array = difference(lambda h: deflection(*displaced_poses(i, k, h)))[:3]
         axes = poses[0][1] * _rpy(SIDES["one"][1]) * _rpy(BETWEEN["orientation"])
         spin = poses[i][1].apply(np.eye(3)[k - 3]) if k >= 3 else np.zeros(3)
         return np.concatenate([rate, axes.inv().apply(spin if i else -spin)])
 
-    ways = np.array([along(i, k) for i in range(2) for k in range(6)])
+    ways = np.array([unit_speed_rates(i, k) for i in range(2) for k in range(6)])
 
     def pull(i: int, k: int) -> float:
         return -float(difference(lambda h: potential(*displaced_poses(i, k, h))))

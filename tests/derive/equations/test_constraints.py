@@ -68,7 +68,7 @@ def _satisfied_constraint(
     return row | ({"axis": list(e)} if kind == "rolling" else {}), rolling(normal, 0.4, e)
 
 
-def _drawn(
+def _random_constraint(
     kind: str, rng: np.random.Generator, tree: Tree, at: Motion
 ) -> tuple[Scene, tuple[int, int, Rows]]:
     """A constraint between two bodies, or the ground and one."""
@@ -95,7 +95,7 @@ def test_random_trees(seed: int) -> None:
     for body in scene["body"]:
         body["ends"]["center"] = list(body["center_of_mass"])
     for kind in (KINDS[seed % 5], KINDS[(seed // 5 + seed) % 3]):
-        row, more = _drawn(kind, rng, tree, at)
+        row, more = _random_constraint(kind, rng, tree, at)
         shares = scipy.linalg.svdvals(columns(tree, q, [*asked, more]))
         if shares[-1] > 1e-2 * shares[0] and len(shares) < tree.nu:
             rows.append(row)

@@ -29,7 +29,7 @@ def close(found: list[Any], wanted: list[Any]) -> bool:
     return all(abs(a - b) < mpmath.mpf(10) ** -30 for a, b in zip(found, wanted, strict=True))
 
 
-def some(count: int, numbers: random.Random) -> list[float]:
+def random_floats(count: int, numbers: random.Random) -> list[float]:
     return [numbers.uniform(-1.0, 1.0) for _ in range(count)]
 
 
@@ -70,7 +70,7 @@ def test_factor_and_triangular(n: int) -> None:
     numbers = random.Random(n)
     with mpmath.workdps(DIGITS):
         a = definite(n, numbers)
-        given = {"A": upper(a), "B": some(2 * n, numbers)}
+        given = {"A": upper(a), "B": random_floats(2 * n, numbers)}
         derivation = primitives(n, 2)
         found = evaluate(lower(derivation, "test"), given, DIGITS)
         stated = evaluate_equations(derivation, given, digits=DIGITS).outputs
@@ -110,8 +110,12 @@ def generic_irs(nu: int) -> dict[str, KernelIR]:
 
 
 def state(nu: int, numbers: random.Random) -> Values:
-    drawn = {"S": upper(definite(6, numbers)), "e": some(6, numbers), "tau": some(nu, numbers)}
-    return drawn | {"delta_I": some(6, numbers)}
+    drawn = {
+        "S": upper(definite(6, numbers)),
+        "e": random_floats(6, numbers),
+        "tau": random_floats(nu, numbers),
+    }
+    return drawn | {"delta_I": random_floats(6, numbers)}
 
 
 def factored_elimination(kernel: KernelIR, given: Values) -> Values:
@@ -129,7 +133,7 @@ def full(given: Values) -> Values:
     return found | evaluate(steps["recover"], given | found | STILL, DIGITS)
 
 
-def same(one: Values, other: Values) -> None:
+def assert_same_results(one: Values, other: Values) -> None:
     for left, right in (("S_Q", "S_I"), ("e_Q", "e_I"), ("udot", "udot"), ("delta", "delta")):
         assert close(one[left], other[right]), left
 
@@ -138,9 +142,9 @@ def same(one: Values, other: Values) -> None:
 def test_factored_elimination_of_any_subspace(nu: int) -> None:
     numbers = random.Random(10 + nu)
     with mpmath.workdps(DIGITS):
-        given = state(nu, numbers) | {"H": some(6 * nu, numbers)}
+        given = state(nu, numbers) | {"H": random_floats(6 * nu, numbers)}
         given["J"] = [numbers.uniform(0.1, 1.0) for _ in range(nu)]
-        same(factored_elimination(generic_irs(nu)["eliminate"], given), full(given))
+        assert_same_results(factored_elimination(generic_irs(nu)["eliminate"], given), full(given))
 
 
 @pytest.mark.parametrize("name", ["pin", "cylindrical", "ball", "free"])
@@ -152,13 +156,13 @@ def test_factored_elimination_of_unit_directions(name: str) -> None:
     nu = len(rows)
     numbers = random.Random(20 + nu)
     with mpmath.workdps(DIGITS):
-        given = state(nu, numbers) | {"J": [0] * nu, "p": [], "q": some(nu, numbers)}
+        given = state(nu, numbers) | {"J": [0] * nu, "p": [], "q": random_floats(nu, numbers)}
         given["H"] = [int(row == rows[k]) for row in range(6) for k in range(nu)]
         kernel = kernels["eliminate"]
         for port in kernel.inputs:
             if port.name in ("p", "q"):
-                given[port.name] = some(port.length(), numbers)
-        same(factored_elimination(kernel, given), full(given))
+                given[port.name] = random_floats(port.length(), numbers)
+        assert_same_results(factored_elimination(kernel, given), full(given))
 
 
 # --- turned axes --------------------------------------------------------------------------------
@@ -172,7 +176,7 @@ def test_turn_by_trace_is_the_turn() -> None:
         given = {
             "Rc": random_rotation(numbers),
             "S": upper(definite(6, numbers)),
-            "e": some(6, numbers),
+            "e": random_floats(6, numbers),
         }
         plain = evaluate(turn, given, DIGITS)
         traced = evaluate(by_trace, given, DIGITS)

@@ -32,7 +32,7 @@ def generic_irs(nu: int) -> dict[str, KernelIR]:
     return {kernel.name: kernel.ir() for kernel in generic_kernels(nu)}
 
 
-def some(count: int, numbers: random.Random) -> list[float]:
+def random_floats(count: int, numbers: random.Random) -> list[float]:
     return [numbers.uniform(-1.0, 1.0) for _ in range(count)]
 
 
@@ -55,7 +55,7 @@ def upper(matrix: Any) -> list[Any]:
 
 def rows(numbers: random.Random, missing: int | None = None) -> list[float]:
     """A regular triangle, or one with a row of zeros."""
-    matrix = triangular(some(21, numbers))
+    matrix = triangular(random_floats(21, numbers))
     for i in range(6):
         matrix[i, i] = 0.0 if i == missing else 1.0 + abs(matrix[i, i])
         if i == missing:
@@ -77,7 +77,7 @@ def test_triangle(height: int, width: int, count: int, sparse: bool) -> None:
     r = sp.MatrixSymbol("R", count, width)
     equation = Equation("R", r, Triangle(there, count))
     derivation = Derivation("test", "triangle", (Quantity(a),), (Quantity(r),), (equation,))
-    given = {"A": some(height * width, random.Random(height))}
+    given = {"A": random_floats(height * width, random.Random(height))}
     with mpmath.workdps(DIGITS):
         found = evaluate(lower(derivation, "test"), given, DIGITS)["R"]
         assert close(found, evaluate_equations(derivation, given, digits=DIGITS).outputs["R"])
@@ -99,7 +99,7 @@ def test_a_rotation_keeps_small_rows_beside_large_ones() -> None:
     equation = Equation("R", r, Triangle(a, 3))
     derivation = Derivation("test", "triangle", (Quantity(a),), (Quantity(r),), (equation,))
     numbers = random.Random(1)
-    given = {"A": [*some(3, numbers), *(1e12 * x for x in some(6, numbers))]}
+    given = {"A": [*random_floats(3, numbers), *(1e12 * x for x in random_floats(6, numbers))]}
     kernel = lower(derivation, "test")
     for first in range(3):  # wherever the light row stands
         turned = given["A"][3 * first :] + given["A"][: 3 * first]
@@ -144,11 +144,11 @@ def test_loads_of_a_body_by_its_rows() -> None:
     numbers = random.Random(4)
     with mpmath.workdps(DIGITS):
         for moments in ([0.3, 0.4, 0.5], [1e-9, 2e-9, 2e-9], [0.0, 0.0, 0.1]):
-            mass, center = 2.0, [mpmath.mpf(x) for x in some(3, numbers)]
+            mass, center = 2.0, [mpmath.mpf(x) for x in random_floats(3, numbers)]
             inertia = mass_matrix(mass, center, moments)[3:, 3:]
             tensor = [inertia[i, j] for i in range(3) for j in range(i, 3)]
             p = [mpmath.mpf(mass), *(mass * x for x in center), *tensor]
-            motion = some(9, numbers)
+            motion = random_floats(9, numbers)
             S = evaluate(kernels["inertia"], {"p": p}, DIGITS)["S"]
             load = evaluate(kernels["bias_load"], {"p": p, "motion": motion}, DIGITS)["e"]
             U = evaluate(STEPS["factor"], {"S": S}, DIGITS)["U"]
@@ -161,7 +161,7 @@ def test_loads_of_a_body_by_its_rows() -> None:
 # --- a hinge ------------------------------------------------------------------------------------
 
 
-def across(nu: int, given: Values) -> Values:
+def eliminate_and_merge(nu: int, given: Values) -> Values:
     """G, g, and what reaches a parent that has rows already, by rotations of rows."""
     found = evaluate(generic_irs(nu)["qr_eliminate"], given, DIGITS)
     behind = {name: found[name] for name in ("V", "d_V", "e_Q")}
@@ -184,13 +184,14 @@ def test_a_hinge_is_passed_as_by_the_riccati_sweep(
     if missing is not None and nu == 6 and not rotors:
         missing = None  # a free body of singular mass matrix has no accelerations
     given: Values = {
-        "Rc": random_rotation(numbers), "r": some(3, numbers), "H": some(6 * nu, numbers),
+        "Rc": random_rotation(numbers), "r": random_floats(3, numbers),
+        "H": random_floats(6 * nu, numbers),
         "J": [numbers.uniform(0.5, 2.0) * rotors for _ in range(nu)], "floor": [0.0, 0.0],
-        "U": rows(numbers, missing), "d": some(6, numbers), "e": some(6, numbers),
-        "tau": some(nu, numbers), "U_P": rows(numbers), "d_P": some(6, numbers),
+        "U": rows(numbers, missing), "d": random_floats(6, numbers), "e": random_floats(6, numbers),
+        "tau": random_floats(nu, numbers), "U_P": rows(numbers), "d_P": random_floats(6, numbers),
     }  # fmt: skip
     with mpmath.workdps(DIGITS):
-        found = across(nu, given)
+        found = eliminate_and_merge(nu, given)
         whole = riccati_form(given["U"], given["d"], given["e"])
         riccati = {name: given[name] for name in ("Rc", "r", "H", "J", "floor", "tau")}
         wanted = evaluate(
@@ -214,7 +215,7 @@ def test_a_motion_without_inertia_is_undetermined() -> None:
 
 
 def test_two_speeds_that_are_one_motion_are_undetermined() -> None:
-    direction = some(6, random.Random(2))
+    direction = random_floats(6, random.Random(2))
     given: Values = {
         "H": [x for x in direction for _ in range(2)], "J": [0, 0], "floor": [0, 0], "d": [0] * 6,
         "e": [0] * 6, "tau": [1, 2], "U": rows(random.Random(3)),

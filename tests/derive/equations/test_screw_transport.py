@@ -50,7 +50,7 @@ Values = dict[str, Any]
 NO_SPEEDS: Values = {name: [] for name in ("H", "J", "s", "tau", "G", "g")} | {"floor": [0.0] * 2}
 
 
-def drawn(seed: int) -> Values:
+def random_inputs(seed: int) -> Values:
     """Screws about x and z, S, e, a motion and a deviation."""
     numbers = random.Random(seed)
     source = InputSampler("sweep", (), ())
@@ -69,7 +69,7 @@ def step(name: str, axis: str, inputs: Values, **given: Any) -> Values:
     return evaluate(SCREW[f"{name}_{axis}"], inputs | here | given, DIGITS)
 
 
-def whole(inputs: Values) -> Values:
+def combined_connection(inputs: Values) -> Values:
     """Rotation and shift of a screw about x followed outwards by one about z."""
     (cx, sx), (cz, sz) = inputs["turn_x"], inputs["turn_z"]
     (dx,), (dz,) = inputs["d_x"], inputs["d_z"]
@@ -86,10 +86,12 @@ def close(found: list[Any], wanted: list[Any]) -> bool:
 @pytest.mark.parametrize("seed", range(3))
 def test_condense_in_parts(seed: int) -> None:
     with mpmath.workdps(DIGITS):
-        inputs = drawn(seed)
+        inputs = random_inputs(seed)
         first = step("condense", "z", inputs)
         second = step("condense", "x", inputs, S=first["S_I"], e=first["e_I"])
-        direct = evaluate(RIGID["condense"].ir(), inputs | whole(inputs) | NO_SPEEDS, DIGITS)
+        direct = evaluate(
+            RIGID["condense"].ir(), inputs | combined_connection(inputs) | NO_SPEEDS, DIGITS
+        )
         assert close(second["S_I"], direct["S_I"])
         assert close(second["e_I"], direct["e_I"])
 
@@ -97,8 +99,8 @@ def test_condense_in_parts(seed: int) -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_motion_and_deviation_in_parts(seed: int) -> None:
     with mpmath.workdps(DIGITS):
-        inputs = drawn(seed)
-        connection = whole(inputs)
+        inputs = random_inputs(seed)
+        connection = combined_connection(inputs)
         first = step("motion", "x", inputs)
         second = step("motion", "z", inputs, motion_I=first["motion"])
         rest: Values = {

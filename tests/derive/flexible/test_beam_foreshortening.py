@@ -29,12 +29,12 @@ class Drawn:
         self.numbers = random.Random(seed)
         self.of_shapes: dict[str, dict[str, list[sp.Rational]]] = {}
 
-    def some(self, count: int) -> list[sp.Rational]:
+    def random_rationals(self, count: int) -> list[sp.Rational]:
         return [sp.Rational(self.numbers.randint(-99, 99), 64) for _ in range(count)]
 
     def shapes(self, name: str, rows: int) -> sp.Matrix:
         """The value of eta_k shape_k + eta_l shape_l."""
-        self.of_shapes[name] = {k: self.some(rows) for k in "kl"}
+        self.of_shapes[name] = {k: self.random_rationals(rows) for k in "kl"}
         return sum(
             (ETA[k] * sp.Matrix(v) for k, v in self.of_shapes[name].items()), sp.zeros(rows, 1)
         )
@@ -74,7 +74,7 @@ def test_sections_turn_by_the_curvature_of_their_shapes(seed: int) -> None:
 def test_the_axis_stays_across_its_sections(seed: int) -> None:
     drawn = Drawn(seed)
     theta, stretch = drawn.shapes("theta", 3), drawn.shapes("stretch", 1)
-    rotation = {pair: drawn.some(3) for pair in (("k", "k"), ("k", "l"), ("l", "l"))}
+    rotation = {pair: drawn.random_rationals(3) for pair in (("k", "k"), ("k", "l"), ("l", "l"))}
     rotation["l", "k"] = rotation["k", "l"]
     turned = sum(
         (-sp.Matrix(rotation[pair]) * ETA[pair[0]] * ETA[pair[1]] / 2 for pair in PAIRS),
@@ -87,9 +87,9 @@ def test_the_axis_stays_across_its_sections(seed: int) -> None:
 @pytest.mark.parametrize("seed", [5, 6])
 def test_moments_of_second_order_are_those_of_a_rectangular_section(seed: int) -> None:
     drawn = Drawn(seed)
-    turn, x = drawn.shapes("turn", 3), drawn.some(1)
-    g = {pair: drawn.some(3) for pair in (("k", "k"), ("k", "l"), ("l", "l"))}
-    h = {pair: drawn.some(3) for pair in g}
+    turn, x = drawn.shapes("turn", 3), drawn.random_rationals(1)
+    g = {pair: drawn.random_rationals(3) for pair in (("k", "k"), ("k", "l"), ("l", "l"))}
+    h = {pair: drawn.random_rationals(3) for pair in g}
     for known in (g, h):
         known["l", "k"] = known["k", "l"]
     axis, turned = (

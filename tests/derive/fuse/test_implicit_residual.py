@@ -20,7 +20,7 @@ from mstmm.runtime.packing.fused_structure import structure_of
 from mstmm.runtime.result.result import Result
 from mstmm.runtime.run.scene_system import SceneSystem
 from tests.reference.jets import Array
-from tests.runtime.engine.test_tangent_matrix import model_and_tangent, rigid, worst
+from tests.runtime.engine.test_tangent_matrix import model_and_tangent, random_rigid_scene, worst
 from tests.support.draws import draws
 from tests.support.scenes import random_flexible as engine_scenes
 
@@ -94,7 +94,7 @@ def condition(tangent: TangentMatrix) -> float:
 @pytest.mark.parametrize("draw", draws(3, 8))
 def test_rigid_trees(draw: int, rng: Generator) -> None:
     """Every hinge, laws with friction and stops, efforts, loads and springs anywhere."""
-    check(*rigid(rng), rng)
+    check(*random_rigid_scene(rng), rng)
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
@@ -106,7 +106,7 @@ def test_flexible_trees(draw: int, rng: Generator) -> None:
 def small(rng: Generator, planar: bool) -> tuple[Scene, Array, Array]:
     """A drawn flexible scene of few speeds, as such code is made for."""
     while True:
-        scene, q, u = engine_scenes.drawn(int(rng.integers(2**32)), planar, 2)
+        scene, q, u = engine_scenes.seeded_scene(int(rng.integers(2**32)), planar, 2)
         if len(u) <= 12:
             return scene, q, u
 

@@ -29,8 +29,8 @@ TIME = 0.3
 SCENES: dict[str, Callable[[], Scene]] = {
     "four-bar": lambda: linkage("closing_pin"),
     "cut at a foot": lambda: linkage("rocker_pin"),
-    "driven where it is cut": lambda: driven("rocker_pin"),
-    "driven in the tree": lambda: driven("closing_pin"),
+    "driven where it is cut": lambda: driven_linkage("rocker_pin"),
+    "driven in the tree": lambda: driven_linkage("closing_pin"),
     "oblique": lambda: four_bar(tilt=(0.4, -0.7, 1.1)),
     "three cranks": cranks,
     "windows": lambda: four_bars(2),
@@ -43,7 +43,7 @@ SCENES: dict[str, Callable[[], Scene]] = {
 }
 
 
-def driven(cut: str) -> Scene:
+def driven_linkage(cut: str) -> Scene:
     """The foot of the rocker is driven."""
     scene = linkage(cut)
     hinge = scene["hinge"][2]
@@ -86,8 +86,8 @@ def test_random_mechanisms(seed: int) -> None:
 
 
 @pytest.fixture(scope="module", params=["four-bar", "Bricard", "disc", "wire"])
-def both(request: pytest.FixtureRequest) -> tuple[mstmm.Model, mstmm.Model]:
-    """What closes by the looped engine and by code of its own."""
+def looped_and_fused(request: pytest.FixtureRequest) -> tuple[mstmm.Model, mstmm.Model]:
+    """Models of a scene with loops: by the looped engine, and by code compiled for it."""
     made: dict[str, Callable[[], Scene]] = {
         "four-bar": lambda: linkage("closing_pin", laws=False), "Bricard": bricard,
         "disc": on_a_road, "wire": lambda: cycloid(0.4),
@@ -97,10 +97,10 @@ def both(request: pytest.FixtureRequest) -> tuple[mstmm.Model, mstmm.Model]:
 
 
 def test_compiled_equals_looped(
-    both: tuple[mstmm.Model, mstmm.Model], rng: np.random.Generator
+    looped_and_fused: tuple[mstmm.Model, mstmm.Model], rng: np.random.Generator
 ) -> None:
     """One state, and several in the lanes of vectors."""
-    looped, fused = both
+    looped, fused = looped_and_fused
     q, u = looped.initial_state()
     many = u + rng.normal(scale=0.1, size=(11, looped.nu))
     states = np.tile(q, (11, 1)), many
@@ -121,9 +121,9 @@ def start_state(model: mstmm.Model, q: Any, u: Any) -> Any:
 
 @pytest.mark.parametrize("away", [1e-9, 1e-6, 1e-4])
 def test_loops_are_closed_alike(
-    away: float, both: tuple[mstmm.Model, mstmm.Model], rng: np.random.Generator
+    away: float, looped_and_fused: tuple[mstmm.Model, mstmm.Model], rng: np.random.Generator
 ) -> None:
-    looped, fused = both
+    looped, fused = looped_and_fused
     q, u = looped.initial_state()
     near = q + away * rng.normal(size=looped.nq), u + away * rng.normal(size=looped.nu)
     wanted = start_state(looped, *near)
@@ -131,8 +131,8 @@ def test_loops_are_closed_alike(
     assert np.abs(start_state(fused, *near) - wanted).max() < AGREEMENT
 
 
-def test_runs_sessions_and_batches(both: tuple[mstmm.Model, mstmm.Model]) -> None:
-    looped, fused = both
+def test_runs_sessions_and_batches(looped_and_fused: tuple[mstmm.Model, mstmm.Model]) -> None:
+    looped, fused = looped_and_fused
     wanted = looped.simulate(0.2, "rk4", step=2e-3, output_times=[0.1, 0.2])
     found = fused.simulate(0.2, "rk4", step=2e-3, output_times=[0.1, 0.2])
     assert found.success and np.abs(found.q - wanted.q).max() < 1e-12
@@ -174,7 +174,7 @@ def test_other_numbers_take_the_same_code() -> None:
 @pytest.mark.parametrize("cut", ["rocker_pin", "closing_pin"])
 def test_power_of_drives(cut: str) -> None:
     """What a drive needs contains what the rows of a cut hinge carry."""
-    model = looped_model(driven(cut))
+    model = looped_model(driven_linkage(cut))
     begun = model.simulate(TIME, t_start=TIME, initial=model.initial_state())
     found = interpreted_outputs(model, begun.q[0], begun.u[0])
     wanted = begun.power()[0]

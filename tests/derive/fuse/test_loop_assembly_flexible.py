@@ -44,18 +44,18 @@ def test_random_chains(seed: int, rng: np.random.Generator) -> None:
 
 
 @pytest.fixture(scope="module", params=[slider_crank, shackled_beam], ids=["crank", "shackle"])
-def both(request: pytest.FixtureRequest) -> tuple[mstmm.Model, mstmm.Model]:
-    """What closes by the looped engine and by code of its own."""
+def looped_and_fused(request: pytest.FixtureRequest) -> tuple[mstmm.Model, mstmm.Model]:
+    """Models of a scene with loops: by the looped engine, and by code compiled for it."""
     scene = request.param()
     return looped_model(scene), compile_scene(scene, "fused")
 
 
 @pytest.mark.parametrize("away", [1e-9, 1e-6, 1e-4])
 def test_loops_are_closed_alike(
-    away: float, both: tuple[mstmm.Model, mstmm.Model], rng: np.random.Generator
+    away: float, looped_and_fused: tuple[mstmm.Model, mstmm.Model], rng: np.random.Generator
 ) -> None:
     """Bodies bend by their inertia there, in both."""
-    looped, fused = both
+    looped, fused = looped_and_fused
     q, u = looped.initial_state()
     near = q + away * rng.normal(size=looped.nq), u + away * rng.normal(size=looped.nu)
     wanted = start_state(looped, *near)
@@ -63,8 +63,8 @@ def test_loops_are_closed_alike(
     assert np.abs(start_state(fused, *near) - wanted).max() < 10 * AGREEMENT
 
 
-def test_runs_and_batches(both: tuple[mstmm.Model, mstmm.Model]) -> None:
-    looped, fused = both
+def test_runs_and_batches(looped_and_fused: tuple[mstmm.Model, mstmm.Model]) -> None:
+    looped, fused = looped_and_fused
     wanted = looped.simulate(0.1, "rk4", step=5e-4, output_times=[0.05, 0.1])
     found = fused.simulate(0.1, "rk4", step=5e-4, output_times=[0.05, 0.1])
     assert found.success and np.abs(found.q - wanted.q).max() < 1e-11

@@ -22,7 +22,7 @@ from mstmm.ir.graph import Graph
 from mstmm.ir.inline import unroll
 from mstmm.ir.interpreter import GuardFailure, evaluate_floats
 from mstmm.runtime.kernels import numpy_kernels
-from tests.support.kernels.c_library import CLibrary, build, same
+from tests.support.kernels.c_library import CLibrary, are_same_numbers, build
 from tests.support.kernels.random_kernels import element
 
 n = sp.Symbol("n", integer=True, positive=True)
@@ -81,7 +81,7 @@ GUARDS = ((sp.MatrixSymbol("V", 1, 1)[0, 0] < 1000, 5, "too much energy"),)
 KERNEL = lower(DERIVATION, "forms", GUARDS)
 
 
-def drawn(kernel: KernelIR, size: int, seed: int = 1) -> dict[str, list[float]]:
+def random_inputs(kernel: KernelIR, size: int, seed: int = 1) -> dict[str, list[float]]:
     numbers = random.Random(seed)
     inputs = {
         p.name: [numbers.uniform(-1, 1) for _ in range(p.length(size))] for p in kernel.inputs
@@ -103,7 +103,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> CLibrary:
 
 @pytest.mark.parametrize("size", SIZES)
 def test_with_loops_and_with_the_size_put_in(size: int) -> None:
-    inputs = drawn(KERNEL, size)
+    inputs = random_inputs(KERNEL, size)
     stated = evaluate_equations(DERIVATION, inputs, GUARDS, 50, size).outputs
     forms = {
         "loops": evaluate(KERNEL, inputs, 50, size),
@@ -120,23 +120,23 @@ def test_with_loops_and_with_the_size_put_in(size: int) -> None:
 
 @pytest.mark.parametrize("size", SIZES)
 def test_c_equals_floats(size: int, library: CLibrary) -> None:
-    inputs = drawn(KERNEL, size)
+    inputs = random_inputs(KERNEL, size)
     outcome = library.call("forms", "forms", inputs, size)
     assert outcome.code == 0
     wanted = evaluate_floats(KERNEL, inputs, size)
     for name, row in wanted.items():
-        assert same(outcome.outputs[name], row), name
+        assert are_same_numbers(outcome.outputs[name], row), name
     for name, limits in rounding_bounds(KERNEL, inputs, size).items():
         for value, (exact, bound) in zip(outcome.outputs[name], limits, strict=True):
             assert abs(value - exact) <= bound
 
 
 def test_guards_and_pivots_leave_in_every_form(library: CLibrary) -> None:
-    huge = drawn(KERNEL, 2)
+    huge = random_inputs(KERNEL, 2)
     huge["A"] = [1e4 * a for a in huge["A"]]
     huge["eta"] = [1.0, 1.0]
     huge["A"][0] = 1e6
-    singular = drawn(KERNEL, 2) | {"B": [1.0, 1.0, 1.0, 1.0]}
+    singular = random_inputs(KERNEL, 2) | {"B": [1.0, 1.0, 1.0, 1.0]}
     for inputs, code in ((huge, 5), (singular, 1)):
         assert library.call("forms", "forms", inputs, 2).code == code
         for kernel, size in ((KERNEL, 2), (unroll(KERNEL, 2), None)):
@@ -155,7 +155,7 @@ def test_guards_and_pivots_leave_in_every_form(library: CLibrary) -> None:
 def test_many_points_at_once(size: int) -> None:
     """Inputs with different leading axes, against one point at a time."""
     leads: Iterator[tuple[int, ...]] = iter([(), (4,), (2, 1), (2, 4), (), (1, 4)])
-    points = [drawn(KERNEL, size, seed) for seed in range(8)]
+    points = [random_inputs(KERNEL, size, seed) for seed in range(8)]
     shapes = {port.name: extents(port, size) for port in (*KERNEL.inputs, *KERNEL.outputs)}
     inputs: dict[str, np.ndarray] = {}
     for port in KERNEL.inputs:
@@ -254,7 +254,9 @@ def test_nested_sums_are_differentiated() -> None:
 # --- what is refused ------------------------------------------------------------------------------
 
 
-def plain(*definitions: tuple[sp.Basic, sp.Basic], outputs: tuple[sp.Basic, ...]) -> KernelIR:
+def lower_equations(
+    *definitions: tuple[sp.Basic, sp.Basic], outputs: tuple[sp.Basic, ...]
+) -> KernelIR:
     return lower(
         Derivation(
             "wrong",
@@ -289,7 +291,7 @@ def test_what_cannot_be_lowered_says_why() -> None:
     )  # fmt: skip
     for message, definitions, outputs in cases:
         with pytest.raises((NotImplementedError, ValueError), match=message):
-            plain(*definitions, outputs=outputs)
+            lower_equations(*definitions, outputs=outputs)
 
 
 def sized_kernel(*statements: object, outputs: tuple[Port, ...] = (Port("y", ("n",)),)) -> KernelIR:
@@ -328,6 +330,6 @@ def test_the_ir_refuses_loops_that_no_backend_has() -> None:
 
 def test_a_size_is_named_where_the_length_is_wrong() -> None:
     with pytest.raises(ValueError, match=r"A takes 4 numbers, not 3|A: expected 4 numbers"):
-        evaluate(KERNEL, drawn(KERNEL, 2) | {"A": [1.0, 2.0, 3.0]}, n=2)
+        evaluate(KERNEL, random_inputs(KERNEL, 2) | {"A": [1.0, 2.0, 3.0]}, n=2)
     assert DERIVATION.size == n
     assert DERIVATION.at_size(3).size is None

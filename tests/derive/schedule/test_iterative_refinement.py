@@ -12,7 +12,7 @@ import mstmm
 from mstmm.errors import SceneError
 from mstmm.pipeline.extended_precision import extended_precision_accelerations, relative_error
 from tests.reference import newton_euler as dense
-from tests.reference.compare import drawn, worst
+from tests.reference.compare import seeded_scene, worst
 from tests.reference.jets import Array
 from tests.runtime.packing.test_qr_sweep import HEAVY, TIME, with_tip
 from tests.support.scenes.rods import chain, drawn_state
@@ -88,7 +88,7 @@ def test_a_flexible_body_before_the_heavy_one(rng: np.random.Generator) -> None:
 @pytest.mark.parametrize("seed", range(300, 312))
 def test_random_trees_keep_loads_and_energy(seed: int) -> None:
     """What a refined evaluation leaves behind is read by forces, efforts and power."""
-    scene, q, u = drawn(seed)
+    scene, q, u = seeded_scene(seed)
     model, other = model_with_sweep(scene), model_with_sweep(scene, sweep="riccati")
     assert worst(model.accelerations(q, u, t=TIME), dense.solve(scene, q, u, TIME).udot) < 1e-12
     here: dict[str, Any] = {"t_start": TIME, "t_end": TIME, "initial": (q, u)}

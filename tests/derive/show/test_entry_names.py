@@ -79,9 +79,9 @@ def test_functions_that_switch_pass_the_audit() -> None:
 
 def test_names_of_code_are_those_of_equations() -> None:
     names = declared_names((), (), Stop.parameters)
-    assert names.written("p", 4)[:2] == ("p.stiffness_of_the_left_side", "p.gap")
-    assert names.written("motion_I", 9)[3] == "wd_I[0]"
-    assert names.written("p", 5) == () and names.written("x", 3) == ()
+    assert names.code_entries("p", 4)[:2] == ("p.stiffness_of_the_left_side", "p.gap")
+    assert names.code_entries("motion_I", 9)[3] == "wd_I[0]"
+    assert names.code_entries("p", 5) == () and names.code_entries("x", 3) == ()
 
 
 # --- sentences ----------------------------------------------------------------------------------

@@ -48,12 +48,13 @@ def hinge(
     return HEAD + text + "".join(INDENT + line for line in more)
 
 
-def along(entry: str) -> str:
+def hinge_with_position(entry: str) -> str:
     """A hinge whose position has this first entry."""
     return hinge(position=f"sp.Matrix([{entry}, 0, 0])")
 
 
-def own(*more: str) -> str:
+def hinge_with_lines(*more: str) -> str:
+    """A hinge about z with more lines in its class."""
     return hinge("rotation_about(2, q.a)", "sp.zeros(3, 1)", *more)
 
 
@@ -75,21 +76,24 @@ def hinge_source(what: str, text: str) -> str:
 
 WRONG: dict[str, tuple[str, str]] = {
     # its place in a scene
-    "frame": (own("frame_rule = 'sideways'"), "frame_rule: expected one of .*found 'sideways'"),
+    "frame": (
+        hinge_with_lines("frame_rule = 'sideways'"),
+        "frame_rule: expected one of .*found 'sideways'",
+    ),
     "keys": (
-        own("scene_keys = ('axis3',)"),
+        hinge_with_lines("scene_keys = ('axis3',)"),
         "scene_keys: expected a tuple of axis, axis2, lead, found",
     ),
     "one axis": (
-        own("frame_rule = 'crossing'"),
+        hinge_with_lines("frame_rule = 'crossing'"),
         'frame_rule "crossing" needs axis2 among the scene_keys',
     ),
     "no lead": (
-        own("scene_keys = ('axis', 'lead')"),
+        hinge_with_lines("scene_keys = ('axis', 'lead')"),
         "scene_keys: lead is not a declared parameter",
     ),
     "no angle": (
-        own("frame_rule, scene_keys, parameters = 'crossing', ('axis', 'axis2'), ()"),
+        hinge_with_lines("frame_rule, scene_keys, parameters = 'crossing', ('axis', 'axis2'), ()"),
         "first parameter is the angle between the axes",
     ),
     # motion
@@ -100,11 +104,11 @@ WRONG: dict[str, tuple[str, str]] = {
     ),
     "mirror": (hinge("sp.diag(1, 1, -1)"), "det R = -1"),
     "subspace": (
-        own("def motion_subspace(self, q, p): return sp.Matrix([0, 0, 0, 0, 0, 2])"),
+        hinge_with_lines("def motion_subspace(self, q, p): return sp.Matrix([0, 0, 0, 0, 0, 2])"),
         r"motion_subspace\(q, p\) disagrees .* entry \(6, 1\): stated 2, derived 1",
     ),
     "subspace shape": (
-        own("def motion_subspace(self, q, p): return sp.eye(3)"),
+        hinge_with_lines("def motion_subspace(self, q, p): return sp.eye(3)"),
         r"motion_subspace\(q, p\) is 3 x 3, expected 6 x 1",
     ),
     "bias": (
@@ -116,32 +120,41 @@ WRONG: dict[str, tuple[str, str]] = {
         r"bias_acceleration\(q, u, p\) disagrees .* stated 0, derived",
     ),
     # expressions
-    "undefined function": (along("p.r * sp.Function('g')(q.a)"), "unknown function g"),
+    "undefined function": (
+        hinge_with_position("p.r * sp.Function('g')(q.a)"),
+        "unknown function g",
+    ),
     "no such function": (
-        along("p.r * sp.erf(q.a)"),
+        hinge_with_position("p.r * sp.erf(q.a)"),
         "unknown function erf; expected one of abs, acos",
     ),
-    "integral": (along("p.r * sp.Integral(sp.sin(q.a), q.a)"), "unknown function Integral"),
-    "not a number": (along("sp.nan * p.r"), r"position\(q, p\) must be finite, found nan"),
-    "infinite": (along("sp.oo"), r"position\(q, p\) must be finite, found oo"),
-    "division by zero": (along("p.r / 0"), "must be finite, found zoo"),
-    "imaginary": (along("p.r * sp.I"), "must be real, found the imaginary unit"),
+    "integral": (
+        hinge_with_position("p.r * sp.Integral(sp.sin(q.a), q.a)"),
+        "unknown function Integral",
+    ),
+    "not a number": (
+        hinge_with_position("sp.nan * p.r"),
+        r"position\(q, p\) must be finite, found nan",
+    ),
+    "infinite": (hinge_with_position("sp.oo"), r"position\(q, p\) must be finite, found oo"),
+    "division by zero": (hinge_with_position("p.r / 0"), "must be finite, found zoo"),
+    "imaginary": (hinge_with_position("p.r * sp.I"), "must be real, found the imaginary unit"),
     "complex": (
-        along("p.r * sp.sqrt(-1 - q.a**2)"),
+        hinge_with_position("p.r * sp.sqrt(-1 - q.a**2)"),
         r"position\(q, p\): .*no finite real value, at q_a",
     ),
-    "open piecewise": (along("sp.Piecewise((p.r, q.a > 0))"), "without a last case"),
+    "open piecewise": (hinge_with_position("sp.Piecewise((p.r, q.a > 0))"), "without a last case"),
     "strange symbol": (
-        along("p.r * sp.Symbol('z')"),
+        hinge_with_position("p.r * sp.Symbol('z')"),
         r"position\(q, p\) contains z; expected only q, p",
     ),
-    "math": (along("p.r * math.sin(q.a)"), "take functions from sympy"),
-    "numpy": (along("p.r * numpy.sin(q.a)"), "take functions from sympy"),
+    "math": (hinge_with_position("p.r * math.sin(q.a)"), "take functions from sympy"),
+    "numpy": (hinge_with_position("p.r * numpy.sin(q.a)"), "take functions from sympy"),
     "wrong name": (
         hinge("rotation_about(2, q.angle)"),
         r"rotation\(q, p\) failed with AttributeError: 'angle' is not declared; declared names: a",
     ),
-    "wrong parameter": (along("p.R"), "'R' is not declared; declared names: r"),
+    "wrong parameter": (hinge_with_position("p.R"), "'R' is not declared; declared names: r"),
     "wrong index": (hinge("rotation_about(2, q[4])"), r"rotation\(q, p\) failed with IndexError"),
     "no return": (hinge("None"), r"rotation\(q, p\) returns nothing"),
     "text": (hinge(position="'here'"), r"position\(q, p\) must be a matrix .* found 'here'"),
@@ -152,9 +165,15 @@ WRONG: dict[str, tuple[str, str]] = {
         r"rotation\(q, p\) failed with TypeError",
     ),
     # units
-    "length from angle": (along("q.a"), r"entry \(1, 1\) of position\(q, p\) = q_a: expected m"),
-    "sum": (along("p.r + p.r**2"), "adds m and m|adds m.2 and m"),
-    "sine of a length": (along("p.r * sp.sin(p.r)"), "sin.* expects a pure number, found m"),
+    "length from angle": (
+        hinge_with_position("q.a"),
+        r"entry \(1, 1\) of position\(q, p\) = q_a: expected m",
+    ),
+    "sum": (hinge_with_position("p.r + p.r**2"), "adds m and m|adds m.2 and m"),
+    "sine of a length": (
+        hinge_with_position("p.r * sp.sin(p.r)"),
+        "sin.* expects a pure number, found m",
+    ),
     "unit": (
         hinge_source("parameters", "(Param('r', 'furlong'),)"),
         "unknown unit 'furlong'; use m, kg",
@@ -162,34 +181,34 @@ WRONG: dict[str, tuple[str, str]] = {
     "no unit": (hinge_source("parameters", "(Param('r', 3),)"), "unit of r: expected text such as"),
     # speeds
     "speeds": (
-        own("speeds = (Param('w', 'rad/s'), Param('z', 'rad/s'))"),
+        hinge_with_lines("speeds = (Param('w', 'rad/s'), Param('z', 'rad/s'))"),
         "1 coordinates but 2 speeds; state qdot",
     ),
     "many speeds": (
-        own(
+        hinge_with_lines(
             "speeds = tuple(Param(f'w{i}', 'rad/s') for i in range(7))",
             "def coordinate_rates(self, q, u, p): return sp.Matrix([u[0]])",
         ),
         "at most six",
     ),
     "rates shape": (
-        own("def coordinate_rates(self, q, u, p): return [u[0], u[0]]"),
+        hinge_with_lines("def coordinate_rates(self, q, u, p): return [u[0], u[0]]"),
         "must be 1 x 1, found 2",
     ),
     "rates squared": (
-        own("def coordinate_rates(self, q, u, p): return [u[0]**2]"),
+        hinge_with_lines("def coordinate_rates(self, q, u, p): return [u[0]**2]"),
         "must be linear in u",
     ),
     "rates offset": (
-        own("def coordinate_rates(self, q, u, p): return [u[0] + 1]"),
+        hinge_with_lines("def coordinate_rates(self, q, u, p): return [u[0] + 1]"),
         "must vanish with u",
     ),
     "rates unit": (
-        own("def coordinate_rates(self, q, u, p): return [p.r * u[0]]"),
+        hinge_with_lines("def coordinate_rates(self, q, u, p): return [p.r * u[0]]"),
         "expected rad/s, found m",
     ),
     "rates raise": (
-        own("def coordinate_rates(self, q, u, p): return 1 / 0"),
+        hinge_with_lines("def coordinate_rates(self, q, u, p): return 1 / 0"),
         r"coordinate_rates\(q, u, p\) failed with ZeroDivisionError",
     ),
     # declarations
@@ -299,7 +318,7 @@ ACCEPTED = {
         "[p.r * sp.sin(q.a), 0, 0]",
     ),
     "arrays": hinge("numpy.eye(3)", "numpy.array([p.r * q.a, 0, 0])"),
-    "piecewise": along("sp.Piecewise((p.r * q.a**2, q.a > 0), (0, True))"),
+    "piecewise": hinge_with_position("sp.Piecewise((p.r * q.a**2, q.a > 0), (0, True))"),
     "list of parameters": hinge_source("coordinates", "[Param('a', 'rad')]"),
     "body": body(),
     "force": force("([-p.k * x[0], 0, 0], [0, 0, 0])"),

@@ -64,11 +64,11 @@ def test_no_answer_and_no_number_are_failures() -> None:
 
 
 def test_other_errors_are_not_swallowed() -> None:
-    def broken(x: float) -> float:
+    def divide_by_zero(x: float) -> float:
         raise ZeroDivisionError
 
     with pytest.raises(ZeroDivisionError):
-        MeasuredMethod(broken, 1.0).is_within_limit(0.0)
+        MeasuredMethod(divide_by_zero, 1.0).is_within_limit(0.0)
 
 
 def test_islands_are_told() -> None:

@@ -160,10 +160,10 @@ def test_doctor_finds_what_is_wrong(
 def test_doctor_survives_kernels_that_do_not_load(
     mstmm: Command, place: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def broken() -> None:
+    def raise_load_error() -> None:
         raise RuntimeError("symbol lookup error")
 
-    monkeypatch.setattr("mstmm.runtime.kernels.prebuilt_kernels.elements", broken)
+    monkeypatch.setattr("mstmm.runtime.kernels.prebuilt_kernels.elements", raise_load_error)
     done = mstmm("doctor", "--json")
     problems = [f for f in json.loads(done.out)["findings"] if not f["ok"]]
     assert done.code == 3 and any("symbol lookup" in f["text"] for f in problems)

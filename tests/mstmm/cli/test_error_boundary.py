@@ -46,10 +46,10 @@ def test_exit_codes(error: BaseException, code: int) -> None:
 
 
 def test_defect_is_owned_up_to(mstmm: Command, monkeypatch: pytest.MonkeyPatch) -> None:
-    def broken(*_: object) -> None:
+    def divide_by_zero(*_: object) -> None:
         raise ZeroDivisionError("seven by zero")
 
-    monkeypatch.setattr("mstmm.load_scene", broken, raising=False)
+    monkeypatch.setattr("mstmm.load_scene", divide_by_zero, raising=False)
     done = mstmm("simulate", "pendulum.toml")
     assert done.code == 1 and "Traceback" not in done.err
     assert "ZeroDivisionError: seven by zero" in done.err and "MSTMM_DEBUG=1" in done.err

@@ -12,7 +12,15 @@ from mstmm.graph.closure_plan import ClosurePlan, closure_plan
 from mstmm.graph.mechanism_graph import GROUND, Edge, MechanismGraph, RowGroup
 from mstmm.graph.minimum_degree import elimination_order
 from tests.support.graph import exhaustive_search as reference
-from tests.support.graph.mechanisms import drawn, four_bars, ladder, net, pins, ring, scissors
+from tests.support.graph.mechanisms import (
+    four_bars,
+    ladder,
+    net,
+    pins,
+    random_mechanism,
+    ring,
+    scissors,
+)
 from tests.support.work import calls
 
 SEEDS = range(40)
@@ -20,7 +28,7 @@ SEEDS = range(40)
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_rows_are_pending_from_their_ends_to_where_they_close(seed: int) -> None:
-    mechanism = drawn(seed)
+    mechanism = random_mechanism(seed)
     plan = closure_plan(mechanism)
     known = dict(enumerate((*plan.cut_of, *range(len(mechanism.hinges), 99))))
     found = [{known[group] for group in groups} for groups in plan.pending]
@@ -37,7 +45,7 @@ def test_rows_are_pending_from_their_ends_to_where_they_close(seed: int) -> None
 @pytest.mark.parametrize("seed", SEEDS)
 def test_closings_come_before_what_they_need_is_gone(seed: int) -> None:
     """A body's closings come before those of every body nearer to the ground on its way."""
-    mechanism = drawn(seed)
+    mechanism = random_mechanism(seed)
     plan = closure_plan(mechanism)
     done: list[int] = []
     for closing in plan.closings:
@@ -62,7 +70,7 @@ def _coupling_matrix(plan: ClosurePlan, draw: random.Random) -> list[list[Fracti
 @pytest.mark.parametrize("seed", SEEDS)
 def test_blocks_that_are_left_out_are_zero(seed: int) -> None:
     """Gauss' elimination in exact numbers, group by group in the order of the closings."""
-    plan = closure_plan(drawn(seed))
+    plan = closure_plan(random_mechanism(seed))
     matrix = _coupling_matrix(plan, random.Random(seed))
     left = set(range(len(plan.groups)))
     for closing in plan.closings:

@@ -11,14 +11,22 @@ from mstmm.graph.spanning_tree import spanning_tree
 from mstmm.graph.tree_growth import breadth_first_tree, depth_first_tree, random_tree
 from mstmm.graph.tree_paths import Paths, total_cost
 from tests.support.graph import exhaustive_search as reference
-from tests.support.graph.mechanisms import drawn, four_bars, ladder, net, pins, ring, scissors
+from tests.support.graph.mechanisms import (
+    four_bars,
+    ladder,
+    net,
+    pins,
+    random_mechanism,
+    ring,
+    scissors,
+)
 
 SEEDS = range(120)
 
 
 @pytest.mark.parametrize("seed", [3, 8, 21, 40])
 def test_work_is_that_of_the_definition_for_every_tree(seed: int) -> None:
-    mechanism = drawn(seed)
+    mechanism = random_mechanism(seed)
     for tree in reference.trees(mechanism):
         assert total_cost(mechanism, tree) == reference.work(mechanism, tree)
 
@@ -28,7 +36,7 @@ def test_no_tree_is_much_cheaper_than_the_chosen_one() -> None:
     a tenth more in the others."""
     shares = []
     for seed in SEEDS:
-        mechanism = drawn(seed)
+        mechanism = random_mechanism(seed)
         least = min(total_cost(mechanism, tree) for tree in reference.trees(mechanism))
         found = total_cost(mechanism, spanning_tree(mechanism))
         shares.append(found / least if least else 1.0 + found)
@@ -40,7 +48,7 @@ def test_no_single_swap_gains_anything_after_the_swaps() -> None:
     """The gains that decide are kept up to date swap by swap; the definition asks anew."""
     tried = 0
     for seed in range(30):
-        mechanism = drawn(seed)
+        mechanism = random_mechanism(seed)
         for start in (breadth_first_tree(mechanism), random_tree(mechanism, seed)):
             tree = improve_by_swaps(mechanism, start)
             assert reference.work(mechanism, tree) <= reference.work(mechanism, start)
@@ -126,7 +134,7 @@ def test_a_tree_that_cannot_be_is_an_error() -> None:
 
 def test_ways_meet_where_their_bodies_have_both_behind_them() -> None:
     for seed in range(20):
-        mechanism = drawn(seed)
+        mechanism = random_mechanism(seed)
         tree = spanning_tree(mechanism)
         paths = Paths(mechanism, tree)
         ways = [reference.inwards(mechanism, tree, body) for body in range(mechanism.bodies)]

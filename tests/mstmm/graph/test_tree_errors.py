@@ -15,7 +15,7 @@ from mstmm.graph.tree_errors import (
     tree_problems,
 )
 from mstmm.graph.tree_growth import grow_tree
-from tests.support.graph.mechanisms import drawn, pins
+from tests.support.graph.mechanisms import pins, random_mechanism
 
 CUT, KEPT = True, False
 
@@ -49,7 +49,7 @@ def test_what_stands_in_the_way_is_named(
 def test_turning_what_is_named_lets_every_body_be_held() -> None:
     turned = 0
     for seed in range(60):
-        plain = drawn(seed)
+        plain = random_mechanism(seed)
         edges = list(plain.hinges)
         for k, edge in enumerate(edges):
             if edge.inboard != GROUND and (seed + k) % 3 == 0:
@@ -66,4 +66,4 @@ def test_turning_what_is_named_lets_every_body_be_held() -> None:
 
 
 def test_a_mechanism_with_a_tree_has_no_obstacle() -> None:
-    assert not [one for seed in range(40) for one in tree_problems(drawn(seed))]
+    assert not [one for seed in range(40) for one in tree_problems(random_mechanism(seed))]

@@ -16,7 +16,7 @@ from mstmm.ir.differentiation import differentiate
 from mstmm.ir.graph import Graph
 from mstmm.ir.interpreter import GuardFailure, evaluate_floats
 from tests.derive.codegen.test_kernel_text import KERNEL as MODAL
-from tests.derive.codegen.test_kernel_text import SIZES, drawn
+from tests.derive.codegen.test_kernel_text import SIZES, random_kernel_inputs
 from tests.support.kernels.complex_arithmetic import complex_step
 from tests.support.kernels.random_kernels import random_inputs, random_kernel
 
@@ -87,7 +87,7 @@ def test_random_kernels_of_all_operations(seed: int) -> None:
 def test_loops_and_solves_of_a_run_time_size(n: int, rng: np.random.Generator) -> None:
     """Sums, stores by mode and x = M^-1 b with b moving."""
     ports = ["scale", "phi", "rate", "F"]
-    inputs, along = drawn(n, rng), directions(MODAL, ports, n, n)
+    inputs, along = random_kernel_inputs(n, rng), directions(MODAL, ports, n, n)
     found = evaluate(differentiate(MODAL, ports), with_directions(inputs, along), 60, n)
     for name, wanted in difference(MODAL, inputs, along, n).items():
         assert farthest(found[f"d_{name}"], wanted) < 1e-18, name
@@ -96,7 +96,7 @@ def test_loops_and_solves_of_a_run_time_size(n: int, rng: np.random.Generator) -
 def test_a_solve_whose_right_side_stands_still_has_no_derivative() -> None:
     found = evaluate(
         differentiate(MODAL, ["scale"]),
-        {**drawn(3, np.random.default_rng(1)), "d_scale": [1.0]}, 50, 3,
+        {**random_kernel_inputs(3, np.random.default_rng(1)), "d_scale": [1.0]}, 50, 3,
     )  # fmt: skip
     assert not any(found["d_x"]) and not any(found["d_X"]) and any(found["d_s"])
 

@@ -14,7 +14,7 @@ from mstmm.derive.verification.kernel_evaluation import evaluate
 from mstmm.ir import OPERATIONS, Assign, KernelIR, Statement, from_json, to_json
 from mstmm.ir.interpreter import GuardFailure, evaluate_floats
 from mstmm.ir.tape import compile_tape
-from tests.support.kernels.c_library import CLibrary, build, same
+from tests.support.kernels.c_library import CLibrary, are_same_numbers, build
 from tests.support.kernels.random_kernels import INPUTS, element, random_inputs, random_kernel
 
 SEEDS = range(30)
@@ -44,10 +44,10 @@ def test_c_equals_floats_and_tape(seed: int, library: CLibrary) -> None:
         compiled = library.call("drawn", kernel.name, inputs)
         code, interpreted = library.run_tape(tape, [inputs[p.name] for p in INPUTS])
         assert compiled.code == code == 0
-        assert same(compiled.outputs["y"], wanted["y"])
-        assert same(compiled.outputs["total"], wanted["total"])
-        assert same(interpreted[0], wanted["y"])
-        assert same(interpreted[1], wanted["total"])
+        assert are_same_numbers(compiled.outputs["y"], wanted["y"])
+        assert are_same_numbers(compiled.outputs["total"], wanted["total"])
+        assert are_same_numbers(interpreted[0], wanted["y"])
+        assert are_same_numbers(interpreted[1], wanted["total"])
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -64,10 +64,12 @@ def test_outputs_that_accumulate_are_added_to(seed: int, library: CLibrary) -> N
     kernel, inputs = KERNELS[seed], random_inputs(seed)
     increment = evaluate_floats(kernel, inputs)["total"]
     wanted = [2.5 + value for value in increment]
-    assert same(library.call("drawn", kernel.name, inputs, start=2.5).outputs["total"], wanted)
+    assert are_same_numbers(
+        library.call("drawn", kernel.name, inputs, start=2.5).outputs["total"], wanted
+    )
     tape = compile_tape(kernel)
     _, (_, total) = library.run_tape(tape, [inputs[p.name] for p in INPUTS], start=2.5)
-    assert same(total, wanted)
+    assert are_same_numbers(total, wanted)
 
 
 def test_a_failed_guard_leaves_with_its_code(library: CLibrary) -> None:

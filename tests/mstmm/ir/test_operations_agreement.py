@@ -16,7 +16,7 @@ from mstmm.derive.verification.kernel_evaluation import evaluate
 from mstmm.ir import OPERATIONS, Assign, Element, KernelIR, Port, Store, Temporary
 from mstmm.ir.interpreter import evaluate_floats
 from mstmm.ir.tape import compile_tape
-from tests.support.kernels.c_library import CLibrary, build, same
+from tests.support.kernels.c_library import CLibrary, are_same_numbers, build
 from tests.support.kernels.random_kernels import element
 
 SPECIAL = (0.0, -0.0, 1.0, -1.0, 0.5, -2.0, 3.0, 1e-310, 710.5, math.inf, -math.inf, math.nan)
@@ -49,11 +49,11 @@ def test_c_tape_and_floats_agree_at_special_points(op: str, library: CLibrary) -
         x = [*point, *(7.0, 8.0, 9.0)][:3]
         wanted = evaluate_floats(KERNELS[op], {"x": x})["y"]
         got = library.call("operations", f"k_{op}", {"x": x}).outputs["y"]
-        assert same(got, wanted), (op, x, got, wanted)
+        assert are_same_numbers(got, wanted), (op, x, got, wanted)
         assert math.copysign(1, got[0]) == math.copysign(1, wanted[0]) or got[0] != got[0], (op, x)
         code, (interpreted,) = library.run_tape(tape, [x])
         assert code == 0
-        assert same(interpreted, got), (op, x, interpreted, got)
+        assert are_same_numbers(interpreted, got), (op, x, interpreted, got)
 
 
 @pytest.mark.parametrize("op", OPERATIONS)

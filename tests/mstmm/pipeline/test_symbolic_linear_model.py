@@ -16,7 +16,7 @@ from mstmm.errors import EnvironmentFailure, SceneError
 from mstmm.runtime.linear.linear_model import Linear
 from mstmm.runtime.linear.symbolic_matrices import SymbolicLinearModel
 from mstmm.runtime.model.model import Model
-from tests.reference.compare import drawn
+from tests.reference.compare import seeded_scene
 from tests.reference.jets import Array
 
 ROD = {"mass": 2.5, "center_of_mass": [0.3, 0, 0], "inertia": [0.1, 0.2, 0.2],
@@ -189,7 +189,7 @@ def test_a_spatial_arm_at_other_values(
 @pytest.mark.parametrize("seed", range(6))
 def test_drawn_trees_at_other_values(seed: int) -> None:
     """Trees with all hinge types, friction, stops, loads and springs in skew frames."""
-    data, q, u = drawn(730 + seed, most=2)
+    data, q, u = seeded_scene(730 + seed, most=2)
     data["allow_unphysical_inertia"] = True
     for body in data["body"]:
         body["allow_unphysical_inertia"] = True

@@ -240,7 +240,7 @@ def test_where_things_are() -> None:
 # --- echo and schema ----------------------------------------------------------------------------
 
 
-def everything() -> dict[str, Any]:
+def complete_scene() -> dict[str, Any]:
     """One scene with every table, most keys, and a user's type of each kind."""
     names = ["b0", "b1", "b2", "b3", "b4", "b5", "wheel"]
     turned = {"position": [1, 1, 0], "orientation": [1, 1, 0, 0]}
@@ -293,7 +293,7 @@ def assert_round_trip(scene: Scene) -> None:
 
 
 def test_round_trip_of_everything() -> None:
-    assert_round_trip(Scene(**everything()))
+    assert_round_trip(Scene(**complete_scene()))
     assert_round_trip(Scene(**arm()))
 
 

@@ -133,12 +133,12 @@ def _factorial(n: int) -> int:
 def section_jet(section: Section, eta: Jet) -> tuple[Jet, Jet]:
     """Place and attitude of a section in frame axes."""
     place = apply(section.phi, eta) + section.place
-    place = place + _grown(section.second[:3], eta)
-    turn = apply(section.theta, eta) + _grown(section.second[3:], eta)
+    place = place + _quadratic_term(section.second[:3], eta)
+    turn = apply(section.theta, eta) + _quadratic_term(section.second[3:], eta)
     return place, exponential(turn) @ section.rotation
 
 
-def _grown(second: Array, eta: Jet) -> Jet:
+def _quadratic_term(second: Array, eta: Jet) -> Jet:
     """1/2 eta^T second eta (..., 3)."""
     x, y, z = ((dot(eta, apply(part, eta)) * 0.5)[..., None] for part in second)
     axes = np.eye(3)

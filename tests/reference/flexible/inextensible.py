@@ -119,7 +119,7 @@ class Chain:
         place = self.path @ np.array([c, s]).T
         return self.mass, place, self.path @ (np.array([-s, c]) * omega).T
 
-    def driven(self, base: Callable[[float], tuple[float, float, float]]) -> Chain:
+    def with_driven_base(self, base: Callable[[float], tuple[float, float, float]]) -> Chain:
         """The chain on a base that turns as t -> (angle, rate, acceleration)."""
         return replace(self, base=base)
 

@@ -133,7 +133,7 @@ class State:
         """Of strain, J."""
         return float(self.end[ENERGY])
 
-    def along(self, places: Array) -> Array:
+    def states_at(self, places: Array) -> Array:
         """States (places, 20)."""
         return march(self.rod, self.load, self.root, places=places)[2][:, :STATE]
 

@@ -63,7 +63,7 @@ def beam_of(scene: Mapping[str, Any]) -> Beam:
     )
 
 
-def _along(beam: Beam, entry: sp.Expr) -> sp.Expr:
+def _length_integral(beam: Beam, entry: sp.Expr) -> sp.Expr:
     """int_0^L entry dx for a polynomial in x."""
     polynomial = sp.Poly(sp.expand(entry), _X)
     return sp.Add(*(c * beam.length ** (k + 1) / (k + 1) for (k,), c in polynomial.terms()))
@@ -156,13 +156,15 @@ class FreeBeam:
         weights = {(0, 0): mass, (2, 0): yy, (0, 2): zz}
         sections = sp.Poly(sp.expand(density), y, z).terms()
         per_length = sp.Add(*(c * weights.get(powers, 0) for powers, c in sections))
-        kinetic = _along(beam, per_length)
+        kinetic = _length_integral(beam, per_length)
         ea, git, eiy, eiz = beam.stiffness
         strain = ea * s.diff(_X) ** 2 + git * psi.diff(_X) ** 2
         strain += eiy * dw.diff(_X, 2) ** 2 + eiz * dv.diff(_X, 2) ** 2
-        potential = _along(beam, strain / 2)
+        potential = _length_integral(beam, strain / 2)
         center = (
-            (rest + first + second).subs({y: 0, z: 0}).applyfunc(lambda e: _along(beam, mass * e))
+            (rest + first + second)
+            .subs({y: 0, z: 0})
+            .applyfunc(lambda e: _length_integral(beam, mass * e))
         )
         whole = mass * beam.length * sp.Matrix(self.place) + self.turn * center
         return kinetic, potential - gravity.dot(whole)

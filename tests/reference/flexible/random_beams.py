@@ -85,7 +85,7 @@ def random_system(
             beams.append(random_beam(rng, name, planar, stiffening))
             held = str(rng.choice([".root", ".mid", ".skew", ".tip"]))
         else:
-            bodies.append(_rigid(rng, name, planar))
+            bodies.append(_random_rigid_body(rng, name, planar))
             held = str(rng.choice(["", ".skew"]))
         inboard = "ground"
         if i:
@@ -120,7 +120,7 @@ def random_system(
     }
 
 
-def _rigid(rng: Generator, name: str, planar: bool) -> Scene:
+def _random_rigid_body(rng: Generator, name: str, planar: bool) -> Scene:
     body = rigid.random_body(rng, name)
     body["mass"] = float(rng.uniform(0.3, 3.0))
     body["inertia"] = rigid.random_inertia(rng, body["mass"])

@@ -35,7 +35,7 @@ SPIN_UPS = {"simo": (SIMO, 6.0), "kane 4": (KANE, 4.0), "kane 6": (KANE, 6.0)}
 def peak(chain: Chain, speed: float, end: float = 8.0) -> dict[str, Any]:
     """Largest deflection of the tip across the turning base, its time, the largest shortening."""
     base = spin_up(speed)
-    turning, times = chain.driven(base), np.linspace(0.0, end, 1601)
+    turning, times = chain.with_driven_base(base), np.linspace(0.0, end, 1601)
     a, _ = turning.run(times, 1e-9)
     angle = np.array([base(t)[0] for t in times])
     x, y = np.array([turning.position(t, row) for t, row in zip(times, a, strict=True)]).T
@@ -57,7 +57,7 @@ def released_motion(beams: list[Beam], end: float, count: int) -> dict[str, Any]
     return {"t": times.tolist(), "tip": limit.tolist(), "correction": correction}
 
 
-def thrown(order: int) -> dict[str, float]:
+def javelin_release(order: int) -> dict[str, float]:
     """The javelin's equivalent velocity, spin and mass centre after a second in the hand.
 
     Two halves of 1 m, 0.5 kg/m and 150 N m^2 that begin at the driven mid section.
@@ -75,7 +75,9 @@ def thrown(order: int) -> dict[str, float]:
     masses, places, velocities = [], [], []
     for turned in (0.0, np.pi):
         half = Beam(1.0, 150.0, 0.5, angle=turned)
-        chain = replace(spectral([half], order, 9.81, clamped=True).driven(hand), lift=lift)
+        chain = replace(
+            spectral([half], order, 9.81, clamped=True).with_driven_base(hand), lift=lift
+        )
         a, rates = chain.run([0.0, 1.0], 1e-8)
         mass, place, velocity = chain.particles(1.0, a[-1], rates[-1])
         masses.append(mass)
@@ -96,7 +98,7 @@ def main() -> None:
     record: dict[str, Any] = {name: released_motion(*case) for name, case in RELEASED.items()}
     for name, (beam, speed) in SPIN_UPS.items():
         record[name] = peak(spectral([beam], 7, clamped=True), speed)
-    record["javelin"] = thrown(6)
+    record["javelin"] = javelin_release(6)
     FILE.write_text(json.dumps(record, indent=1) + "\n")
 
 

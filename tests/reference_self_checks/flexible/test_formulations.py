@@ -86,9 +86,10 @@ def test_shapes_of_the_textbook() -> None:
 
 def test_segments_and_polynomials_find_the_same_spin_up() -> None:
     beam, times = Beam(10.0, 1.4e4, 1.2), np.linspace(0.0, 5.0, 6)
-    exact = spectral([beam], 5, clamped=True).driven(spin_up(6.0)).tips(times, 1e-8)
+    exact = spectral([beam], 5, clamped=True).with_driven_base(spin_up(6.0)).tips(times, 1e-8)
     tips = [
-        segments([beam], n, clamped=True).driven(spin_up(6.0)).tips(times, 1e-8) for n in (4, 8)
+        segments([beam], n, clamped=True).with_driven_base(spin_up(6.0)).tips(times, 1e-8)
+        for n in (4, 8)
     ]
     assert worst(extrapolated_limit(tips)[0], exact) < 2e-5
 

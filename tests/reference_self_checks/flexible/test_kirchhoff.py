@@ -90,7 +90,7 @@ def test_twist_of_second_order() -> None:
 def test_first_integrals_and_balance() -> None:
     """Along a uniform rod without load per length m.u/2 + n.t, m.n and m + r x n are constant."""
     state = solve(FLAT, Load((0.3, 1.5, 2.0), (0.4, -0.2, 0.3)))
-    y = state.along(np.linspace(0.0, 1.0, 9))
+    y = state.states_at(np.linspace(0.0, 1.0, 9))
     r, R, n, m = y[:, :3], y[:, 3:12].reshape(-1, 3, 3), y[:, 12:15], y[:, 15:18]
     own = np.einsum("pij,pi->pj", R, m)
     hamiltonian = 0.5 * (own**2 @ FLAT.compliance) + (n * R[:, :, 0]).sum(1)
@@ -113,7 +113,7 @@ def test_loads_on_an_arm_and_along_the_axis(follower: bool) -> None:
     assert moment == pytest.approx(turn @ load.moment + lever, abs=1e-10)
     assert state.root[:3] == pytest.approx(force + load.per_length, abs=1e-10)
     x, w = legendre.leggauss(12)
-    axis = state.along((x + 1) / 2)[:, :3]
+    axis = state.states_at((x + 1) / 2)[:, :3]
     spread = np.cross(w / 2 @ axis, load.per_length)
     expected = moment + np.cross(state.end[:3], force) + spread
     assert state.root[3:] == pytest.approx(expected, abs=1e-10)

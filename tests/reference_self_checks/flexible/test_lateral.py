@@ -111,7 +111,7 @@ def test_after_buckling() -> None:
     assert buckled.buckled_directions() == 0
     assert solve(rod, load).buckled_directions() == 1
     energy, force = Ritz(1 / rod.compliance, 1.0, 16), np.array(load.force)
-    attitudes = buckled.along(energy.places)[:, 3:12].reshape(-1, 3, 3)
+    attitudes = buckled.states_at(energy.places)[:, 3:12].reshape(-1, 3, 3)
     start = energy.fitted_coefficients(Rotation.from_matrix(attitudes).as_rotvec())
     a = energy.equilibrium(force, start)
     assert energy.tip(a) == pytest.approx(buckled.end[:3], abs=1e-10)

@@ -11,7 +11,7 @@ import mstmm
 from mstmm.runtime.advice import advice_summary, advise, scene_reduction, tables
 from mstmm.runtime.advice.advice import BodyAdvice
 from mstmm.runtime.advice.body_model_levels import RIGID, BodyModel
-from tests.support.scenes.advice import sprung, tip
+from tests.support.scenes.advice import sprung_rods, tip
 
 OF = "d.tip.position"
 
@@ -27,7 +27,7 @@ def error(made: mstmm.Advice, scene: mstmm.Scene) -> float:
 
 def test_stiff_hinges_become_rigid() -> None:
     """Where they stand, not where they were drawn: the sprung pin rests at 0.4 rad."""
-    scene = sprung(3e5)
+    scene = sprung_rods(3e5)
     made = mstmm.advise(scene, 1.0, error=1e-2, of=OF, rounds=1, budget=600)
     told = " ".join(made.other_changes)
     assert all(f'hinge "{name}": rigid' in told for name in ("spring", "bushing", "slide"))
@@ -47,7 +47,7 @@ def test_a_model_that_takes_longer_and_errs_more_is_not_advised(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Then the scene stays as it is, and a note tells what was found."""
-    scene = sprung(3e5)
+    scene = sprung_rods(3e5)
     monkeypatch.setattr(advice_summary, "compare_cpu_times", lambda *_: (0.89, 1.0))
     made = mstmm.advise(scene, 1.0, error=1e-2, of=OF, rounds=0, budget=600)
     assert not made.is_reduced and made.other_changes == () and made.model_saving == 1.0
@@ -58,7 +58,7 @@ def test_a_model_that_takes_longer_and_errs_more_is_not_advised(
 
 def test_soft_ones_stay() -> None:
     """50 N m/rad under rods of 1 kg: it swings by more than a rad; a damper of 5 N m s brakes."""
-    scene = sprung(50.0, damping=5.0)
+    scene = sprung_rods(50.0, damping=5.0)
     made = mstmm.advise(scene, 1.0, error=1e-3, of=OF, rounds=0, budget=600)
     told = " ".join(made.other_changes)
     assert "pivot" not in told
@@ -75,7 +75,7 @@ def test_springs_between_bodies_that_do_nothing() -> None:
         {"name": "taut", "from": "ground", "to": "a.tip", "position": [1, 1, 0],
          "law": {"stiffness": 100.0}},
     ]  # fmt: skip
-    scene = mstmm.Scene(**{**sprung(1e5).model_dump(by_alias=True), "spring": springs})
+    scene = mstmm.Scene(**{**sprung_rods(1e5).model_dump(by_alias=True), "spring": springs})
     made = mstmm.advise(scene, 0.5, error=1e-2, of=OF, rounds=0, budget=600)
     assert [one.name for one in made.scene.spring] == ["taut"]
     assert any('spring "slack": left out' in text for text in made.other_changes)
@@ -83,7 +83,7 @@ def test_springs_between_bodies_that_do_nothing() -> None:
 
 @pytest.mark.parametrize("by_event", [True, False])
 def test_what_is_released_stays(by_event: bool) -> None:
-    data = sprung(3e5).model_dump(by_alias=True)
+    data = sprung_rods(3e5).model_dump(by_alias=True)
     *others, slide = data["hinge"]
     slide |= {"law": {}, "drive": "0", "initial": None}
     if by_event:
@@ -99,7 +99,7 @@ def test_what_is_released_stays(by_event: bool) -> None:
 def test_what_the_budget_leaves_no_time_for_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without time for a search the scene stays, and the advice says what was not examined; two
     budgets with time enough give the same scene."""
-    scene = sprung(3e5)
+    scene = sprung_rods(3e5)
     small, large = (
         mstmm.advise(scene, 1.0, error=1e-2, of=OF, rounds=0, budget=seconds)
         for seconds in (600, 1200)

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 import mstmm
 from mstmm.errors import SceneError
 from mstmm.runtime.chart.chart import Chart
-from tests.support.scenes.chart import AMPLITUDE, GRAVITY, LENGTH, pendulum, stiff, swing
+from tests.support.scenes.chart import AMPLITUDE, GRAVITY, LENGTH, pendulum, stiff_rods, swing
 
 T_END, SAMPLES = 3.0, 31
 TIMES = np.linspace(0.0, T_END, SAMPLES)
@@ -96,7 +96,7 @@ def test_several_quantities_count_in_parts_of_their_excursions() -> None:
 
 def test_a_stiff_reference_agrees_with_an_integrator_of_others() -> None:
     """SciPy's Radau over the accelerations of the model."""
-    made_of = mstmm.compile(stiff(1e5), engine="looped")
+    made_of = mstmm.compile(stiff_rods(1e5), engine="looped")
     q, u = made_of.initial_state()
     assert made_of.nq == 8
 

@@ -7,7 +7,7 @@ import pytest
 
 import mstmm
 from mstmm.runtime.chart.error_times import equidistant_times, refine_times
-from tests.support.scenes.chart import pendulum, stiff
+from tests.support.scenes.chart import pendulum, stiff_rods
 
 
 def test_slow_motions_keep_even_times() -> None:
@@ -43,7 +43,7 @@ def test_ends_of_steps_at_even_times_are_no_further_ones() -> None:
 def test_a_chart_sees_what_lies_between_even_times() -> None:
     """Stiff bushings swing in within a part of the first even spacing: what a loose run errs by
     there, even times do not see."""
-    model = mstmm.compile(stiff(1e5), engine="looped")
+    model = mstmm.compile(stiff_rods(1e5), engine="looped")
 
     def error(samples: int | None) -> tuple[float, mstmm.Chart]:
         made = mstmm.chart(

@@ -17,7 +17,9 @@ from mstmm.runtime.chart.pareto_front import bound_errors, pareto_front, recomme
 REFERENCE = Reference(1e-11, "two runs", "as given", "all coordinates", "1", "none")
 
 
-def drawn(rng: np.random.Generator, curves: int = 6, settings: int = 8) -> tuple[Point, ...]:
+def random_points(
+    rng: np.random.Generator, curves: int = 6, settings: int = 8
+) -> tuple[Point, ...]:
     """Curves whose errors fall on the whole, with hits and misses, ties and failures."""
     found = []
     for c in range(curves):
@@ -34,7 +36,7 @@ def drawn(rng: np.random.Generator, curves: int = 6, settings: int = 8) -> tuple
 
 def test_the_front_is_what_no_other_point_beats(rng: np.random.Generator) -> None:
     for _ in range(50):
-        points = drawn(rng)
+        points = random_points(rng)
         ran = [p for p in points if p.error is not None]
         numbers = [(p.error_bound or 0.0, p.cpu_s or 0.0) for p in ran]
         best = {
@@ -51,7 +53,7 @@ def test_the_front_is_what_no_other_point_beats(rng: np.random.Generator) -> Non
 
 
 def test_sure_errors_are_the_largest_of_tighter_settings(rng: np.random.Generator) -> None:
-    for point in (points := drawn(rng)):
+    for point in (points := random_points(rng)):
         tighter = [
             p.error
             for p in points
@@ -74,7 +76,7 @@ def test_no_setting_is_surely_better_than_its_level_of_model() -> None:
 def test_what_is_recommended_is_on_the_front_and_meets_the_error(rng: np.random.Generator) -> None:
     met = 0
     for _ in range(30):
-        points = drawn(rng)
+        points = random_points(rng)
         for asked in (1e-2, 1e-5, 1e-8):
             enough = [p for p in points if p.error_bound is not None and p.error_bound <= asked]
             if not enough:

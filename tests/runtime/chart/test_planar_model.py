@@ -19,7 +19,7 @@ BODY = {"name": "one", "mass": 1.0, "center_of_mass": [0.5, 0.1, 0], "inertia": 
 TURNED = [float(np.cos(0.25)), 0.0, 0.0, float(np.sin(0.25))]
 
 
-def thrown(axis: str = "z", **ball: Any) -> mstmm.Scene:
+def planar_flight_scene(axis: str = "z", **ball: Any) -> mstmm.Scene:
     """A body that flies and turns in a plane, with another on a ball hinge at its tip.
 
     `axis` is the inertial direction across the plane: the first hinge turns everything there.
@@ -52,7 +52,7 @@ def level(scene: mstmm.Scene) -> Variant | None:
 def test_hinges_become_those_of_a_plane(axis: str) -> None:
     """The motion is the same, of every body, with three coordinates and one in place of six and
     three."""
-    scene, times = thrown(axis), np.linspace(0, 1, 21)
+    scene, times = planar_flight_scene(axis), np.linspace(0, 1, 21)
     found = level(scene)
     assert found is not None
     assert [hinge.type for hinge in found.scene.hinge] == ["planar", "pin"]
@@ -70,13 +70,13 @@ def test_hinges_become_those_of_a_plane(axis: str) -> None:
 
 
 def test_what_leaves_the_plane_stays() -> None:
-    tilted = thrown(initial={"u": [0.1, 0, -2.0]})
+    tilted = planar_flight_scene(initial={"u": [0.1, 0, -2.0]})
     found = level(tilted)
     assert found is None
 
 
 def test_hinges_with_laws_stay() -> None:
-    sprung = thrown(law={"damping": [0.1, 0.1, 0.1]})
+    sprung = planar_flight_scene(law={"damping": [0.1, 0.1, 0.1]})
     found = level(sprung)
     assert found is not None
     assert [hinge.type for hinge in found.scene.hinge] == ["planar", "ball"]
@@ -84,7 +84,13 @@ def test_hinges_with_laws_stay() -> None:
 
 def test_a_chart_of_rigid_bodies_has_the_planar_level() -> None:
     made: Chart = mstmm.chart(
-        thrown(), 1.0, methods=["dop853"], models=True, samples=11, rounds=0, budget=300
+        planar_flight_scene(),
+        1.0,
+        methods=["dop853"],
+        models=True,
+        samples=11,
+        rounds=0,
+        budget=300,
     )
     assert [one.name for one in made.model_levels] == ["planar, rigid", "rigid"]
     error = made.model_levels[0].error

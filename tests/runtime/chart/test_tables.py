@@ -15,7 +15,7 @@ from mstmm.runtime.chart.pareto_front import bound_errors, pareto_front, recomme
 from mstmm.runtime.chart.tables import point_table, recommendation
 from tests.runtime.chart.test_pareto_front import REFERENCE
 from tests.support.paths import EXAMPLES
-from tests.support.scenes.chart import pendulum, stiff
+from tests.support.scenes.chart import pendulum, stiff_rods
 
 #: Fastest motion of the damped bushing, 1/s, and a run of which a thousandth is a step of rk4 that
 #: is just stable (h times it is 2.6 of 2.785) and a 316th one that is not.
@@ -27,11 +27,11 @@ STABLE = 2.785 / FASTEST
 @cache
 def bushing_chart() -> Chart:
     """Chart of a bushing so damped that most of rk4's steps are too long."""
-    return mstmm.chart(stiff(1e4), T_END, methods=["rk4", "rodas4p2"], rounds=0, budget=300)
+    return mstmm.chart(stiff_rods(1e4), T_END, methods=["rk4", "rodas4p2"], rounds=0, budget=300)
 
 
 def test_warnings_are_those_of_the_run() -> None:
-    model = mstmm.compile(stiff(1e4), engine="looped")
+    model = mstmm.compile(stiff_rods(1e4), engine="looped")
     ran = [point for point in bushing_chart().points if point.error is not None]
     for point in ran:
         result = model.simulate(T_END, output_times=[0.0, T_END], **point.setting.options)

@@ -19,7 +19,7 @@ from mstmm.runtime.chart.trial_run import Runs
 from mstmm.runtime.platform_support.interrupts import record_interrupts
 from mstmm.runtime.result.error_measure import Coordinates
 from mstmm.runtime.run.integration_run import advance
-from tests.support.scenes.chart import Clock, hub, pendulum, stiff
+from tests.support.scenes.chart import Clock, hub, pendulum, stiff_rods
 
 METHODS = ("dop853", "dopri5", "rodas4")
 
@@ -83,7 +83,7 @@ def test_no_time_for_a_reference() -> None:
 
 def test_a_run_that_takes_too_long_ends() -> None:
     """Each look at the clock is a second: after the first report of progress time is over."""
-    model = mstmm.compile(stiff(1e12), engine="looped")
+    model = mstmm.compile(stiff_rods(1e12), engine="looped")
     runs = Runs(1e4, np.array([0.0, 1e4]), Budget(1e9, Clock(1.0)))
     setting = Setting("dop853", "as given", 1e-9)
     trial = runs.trial(model, setting, Coordinates(model), limit=0.5)

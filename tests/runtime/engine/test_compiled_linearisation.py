@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 import mstmm
 from mstmm.runtime.engine import compiled_linearisation
-from tests.reference.compare import drawn, worst
+from tests.reference.compare import seeded_scene, worst
 from tests.support.scenes.linear import hanging_beam, pendulum
 
 MATRICES = ("M", "C", "K", "V", "W", "A", "K_elastic", "C_damping")
@@ -49,7 +49,7 @@ def case_of(name: str) -> tuple[mstmm.Scene, ArrayLike, ArrayLike]:
         return hanging_beam(1.0, 2), [0.3, 0.02, -0.01], [0.4, 0.1, 0.2]
     if name == "spider":
         return spider(), np.linspace(-1, 1, 22), np.linspace(2, -1, 22)
-    data, q, u = drawn(33, types=("ball", "pin"), most=2)
+    data, q, u = seeded_scene(33, types=("ball", "pin"), most=2)
     return mstmm.Scene(**data), q, u
 
 

@@ -19,7 +19,7 @@ def pair(**more: Any) -> mstmm.Scene:
     return mstmm.Scene.from_data(data | more)
 
 
-def driven() -> mstmm.Scene:
+def driven_pins() -> mstmm.Scene:
     data = pins(2, [0.3, 0.4]).model_dump(by_alias=True, exclude_unset=True)
     data["hinge"][0].pop("initial")
     data["hinge"][0]["drive"] = ["sqrt(1 - t)"]
@@ -39,7 +39,7 @@ WIND = {"name": "wind", "on": "rod1.tip", "force": [0, "sqrt(1 - t)", 0]}
 SCENES = {
     "an effort": (motor("log(q[0])", speed=-1.0), 'hinge "motor": law.effort[0] = "log(q[0])" is'),
     "a load": (pair(load=[WIND]), 'load "wind": force[1] = "sqrt(1 - t)" is nan at t = 1'),
-    "a drive": (driven(), 'hinge "pin0": drive[0]'),
+    "a drive": (driven_pins(), 'hinge "pin0": drive[0]'),
     "a spring": (pair(spring=[BAND]), 'spring "band": law.effort = "sqrt(q - 1.9)" is nan'),
     "a chain": (rope(), '"sqrt(0.5 + q[0])" is nan'),
 }

@@ -9,7 +9,7 @@ import pytest
 
 from tests.reference import kane, laws, random_scenes
 from tests.reference import newton_euler as dense
-from tests.reference.compare import drawn, fresh, worst
+from tests.reference.compare import fresh, seeded_scene, worst
 from tests.reference.jets import Array
 from tests.reference.tree import SIZES, read
 from tests.support.models import compile_scene
@@ -41,7 +41,7 @@ def compare(scene: dict[str, Any], q: Array, u: Array) -> None:
 
 @pytest.mark.parametrize("seed", range(30))
 def test_random_trees(seed: int) -> None:
-    compare(*drawn(seed))
+    compare(*seeded_scene(seed))
 
 
 @pytest.mark.parametrize("draw", range(15))

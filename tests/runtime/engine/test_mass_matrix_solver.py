@@ -22,7 +22,7 @@ from tests.support.scenes.random_flexible import varied_scene
 ACCURACY = 1e-13
 
 
-def built(scene: dict[str, Any]) -> mstmm.Model:
+def compiled_solver_model(scene: dict[str, Any]) -> mstmm.Model:
     """A model that solves by code compiled for its scene."""
     model = mstmm.compile(mstmm.Scene(**scene))
     model._solver.build()
@@ -68,7 +68,7 @@ def test_chains_of_one_type(kind: str, rng: Generator) -> None:
 @pytest.mark.parametrize("draw", range(2))
 def test_compiled_code_gives_the_same(draw: int, rng: Generator) -> None:
     scene, q, _ = fresh(rng, most=5)
-    looped, fused = looped_model(scene), built(scene)
+    looped, fused = looped_model(scene), compiled_solver_model(scene)
     columns = rng.standard_normal((looped.nu, 11))  # more than a group of lanes
     answers = fused.solve(q, columns)
     check(dense.mass_matrix(scene, q), columns, answers, free_speeds(scene))
@@ -78,7 +78,7 @@ def test_compiled_code_gives_the_same(draw: int, rng: Generator) -> None:
 def test_flexible_bodies_by_both_engines(rng: Generator) -> None:
     """Sections inward and outward, idle ends, drag and springs that must not be felt."""
     scene = varied_scene(int(rng.integers(2**32)), most=3)
-    looped, fused = looped_model(scene), built(scene)
+    looped, fused = looped_model(scene), compiled_solver_model(scene)
     q = looped.initial_state()[0]
     matrix = looped.mass_matrix(q)
     columns = rng.standard_normal((looped.nu, 3))
@@ -166,7 +166,7 @@ def test_a_motion_without_inertia_is_named_by_both_engines() -> None:
     wind = {"on": "rod", "force": ["1/t", 0, 0]}
     scene = {"schema_version": 1, "gravity": [0, 0, 0], "body": [rod], "hinge": [joint],
              "load": [wind]}  # fmt: skip
-    for model in (looped_model(scene), built(scene)):
+    for model in (looped_model(scene), compiled_solver_model(scene)):
         assert model.solve([0.0, 1.0], [1.0, 1.0]).shape == (2,)
         with pytest.raises(mstmm.NumericalFailure, match=r'hinge "cross".*undetermined'):
             model.solve([0.0, 0.0], np.eye(2))

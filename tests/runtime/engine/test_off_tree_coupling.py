@@ -14,7 +14,11 @@ from mstmm.runtime.engine.off_tree_coupling import OffTreeCoupling, off_tree_cou
 from tests.reference.random_couplings import random_coupled
 from tests.support.scenes.linkages import cranks, legs
 from tests.support.scenes.published_mechanisms import andrews, four_bars, scissors
-from tests.system.loops.test_flexible_against_tree import hung, meshed_slider_crank, shackled_beam
+from tests.system.loops.test_flexible_against_tree import (
+    hanging_bar,
+    meshed_slider_crank,
+    shackled_beam,
+)
 
 SEED = 20
 
@@ -58,7 +62,7 @@ SCENES = {
     "windows": four_bars(6, angle=0.7), "on a frame": on_a_frame(5), "springs": with_springs(),
     "told": follower_cranks(6),
     "cranks": cranks(), "legs": legs(law=100.0), "Andrews": andrews(), "scissors": scissors(4),
-    "a blade that hangs": hung(), "shapes in mesh": meshed_slider_crank(),
+    "a blade that hangs": hanging_bar(), "shapes in mesh": meshed_slider_crank(),
     "a flexible rod": shackled_beam(),
 }  # fmt: skip
 

@@ -13,7 +13,7 @@ from mstmm.abi.derivative_library import SYMBOL
 from mstmm.errors import EnvironmentFailure
 from mstmm.runtime.engine import tangent_kernels
 from mstmm.runtime.kernels.derivative_library import open_derivative_library
-from tests.reference.compare import drawn, worst
+from tests.reference.compare import seeded_scene, worst
 
 ARRAYS = ("q", "u", "efforts", "t", "rate_q", "rate_u")
 TIME = 0.3
@@ -32,7 +32,7 @@ def in_use(model: mstmm.Model, names: tuple[str, ...] = ()) -> bool:
 
 def test_compiled_and_interpreted_agree(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Quaternions, laws, loads; a batch; parameters; and the next model finds the library."""
-    data, q, u = drawn(33, types=("ball", "pin"), most=2)
+    data, q, u = seeded_scene(33, types=("ball", "pin"), most=2)
     scene = mstmm.Scene(**data)
     names = (f"{data['body'][0]['name']}.mass", "gravity[1]")
     batch = np.stack([q, q, q]), np.stack([u, 2 * u, -u])
@@ -60,7 +60,7 @@ def test_compiled_and_interpreted_agree(cache: Path, monkeypatch: pytest.MonkeyP
 def test_the_compiler_is_started_when_directions_add_up(
     cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    data, q, u = drawn(11, types=("pin",), most=1)
+    data, q, u = seeded_scene(11, types=("pin",), most=1)
     model = mstmm.compile(mstmm.Scene(**data))
     per_state = 4 * model.nu + 1
     monkeypatch.setattr(tangent_kernels, "WORTH_COMPILING", 3 * per_state)
@@ -72,7 +72,7 @@ def test_the_compiler_is_started_when_directions_add_up(
 def test_without_a_compiler_the_tape_goes_on(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tangent_kernels, "WORTH_COMPILING", 0)
     monkeypatch.setenv("CC", "/bin/false")
-    data, q, u = drawn(11, most=2)
+    data, q, u = seeded_scene(11, most=2)
     model = mstmm.compile(mstmm.Scene(**data))
     for _ in range(2):
         found = model.derivatives(q, u)
@@ -82,7 +82,7 @@ def test_without_a_compiler_the_tape_goes_on(cache: Path, monkeypatch: pytest.Mo
 
 def test_the_looped_engine_never_compiles(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tangent_kernels, "WORTH_COMPILING", 0)
-    data, q, u = drawn(11, most=2)
+    data, q, u = seeded_scene(11, most=2)
     model = mstmm.compile(mstmm.Scene(**data), engine="looped")
     model.derivatives(q, u)
     assert not in_use(model)
@@ -90,7 +90,7 @@ def test_the_looped_engine_never_compiles(cache: Path, monkeypatch: pytest.Monke
 
 def test_another_library_is_refused(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tangent_kernels, "WORTH_COMPILING", 0)
-    data, q, u = drawn(11, types=("pin",), most=1)
+    data, q, u = seeded_scene(11, types=("pin",), most=1)
     model = mstmm.compile(mstmm.Scene(**data))
     model.derivatives(q, u)
     (path,) = [p for p in cache.rglob("*.so") if hasattr(ctypes.CDLL(str(p)), SYMBOL)]

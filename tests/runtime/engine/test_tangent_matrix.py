@@ -28,15 +28,15 @@ UNIT = 2.0**-53
 Scene = dict[str, Any]
 
 
-def rigid(rng: Generator, **changes: Any) -> tuple[Scene, Array, Array]:
+def random_rigid_scene(rng: Generator, **changes: Any) -> tuple[Scene, Array, Array]:
     seed = int(rng.integers(2**32))
     print(f"random_scenes seed = {seed}")
     scene = random_scenes.random_scene(seed, **changes)
     return scene, *random_scenes.random_state(scene, seed)
 
 
-def flexible(rng: Generator, planar: bool) -> tuple[Scene, Array, Array]:
-    return engine_scenes.drawn(int(rng.integers(2**32)), planar, 3)
+def random_flexible_scene(rng: Generator, planar: bool) -> tuple[Scene, Array, Array]:
+    return engine_scenes.seeded_scene(int(rng.integers(2**32)), planar, 3)
 
 
 def model_and_tangent(scene: Scene) -> tuple[mstmm.Model, TangentMatrix]:
@@ -122,37 +122,37 @@ def check_solution(scene: Scene, q: Array, u: Array, rng: Generator) -> None:
 @pytest.mark.parametrize("draw", range(10))
 def test_direction_of_rigid_trees(draw: int, rng: Generator) -> None:
     """Every hinge, laws with friction and stops, efforts, loads and springs anywhere."""
-    check_direction(*rigid(rng), rng)
+    check_direction(*random_rigid_scene(rng), rng)
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
 @pytest.mark.parametrize("draw", draws(4, 8))
 def test_direction_of_flexible_trees(draw: int, rng: Generator) -> None:
     """Beams with drag, points of quadrature, drives, loads on sections."""
-    check_direction(*flexible(rng, draw % 2 == 0), rng)
+    check_direction(*random_flexible_scene(rng, draw % 2 == 0), rng)
 
 
 @pytest.mark.parametrize("draw", range(20))
 def test_solution_of_rigid_trees(draw: int, rng: Generator) -> None:
-    check_solution(*rigid(rng), rng)
+    check_solution(*random_rigid_scene(rng), rng)
 
 
 @pytest.mark.parametrize("draw", range(6))
 def test_solution_of_trees_of_many_tiles(draw: int, rng: Generator) -> None:
     """Bodies are begun tile by tile, ahead of what hangs on them in any other tile."""
-    check_solution(*rigid(rng, most=60, loads=draw % 2 == 0), rng)
+    check_solution(*random_rigid_scene(rng, most=60, loads=draw % 2 == 0), rng)
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
 @pytest.mark.parametrize("draw", draws(4, 12))
 def test_solution_of_flexible_trees(draw: int, rng: Generator) -> None:
-    check_solution(*flexible(rng, draw % 2 == 0), rng)
+    check_solution(*random_flexible_scene(rng, draw % 2 == 0), rng)
 
 
 @pytest.mark.parametrize("draw", draws(2, 4))
 def test_direction_by_derivatives_of_accelerations(draw: int, rng: Generator) -> None:
     """Where R = 0 its derivatives are those of the accelerations times -M, found by other code."""
-    scene, q, u = rigid(rng)
+    scene, q, u = random_rigid_scene(rng)
     model, tangent = model_and_tangent(scene)
     found, mass = model.derivatives(q, u, t=TIME), model.mass_matrix(q)
     tangent.residual(TIME, q, u, found.udot)

@@ -65,7 +65,7 @@ def test_a_piece_a_million_times_lighter_is_a_beam() -> None:
     assert clamped_beam_model(**stepped_beam_keys(4e-6)).simulate(1e-3, rtol=1e-5).success
 
 
-def soft(**change: Any) -> mstmm.Model:
+def soft_body_model(**change: Any) -> mstmm.Model:
     box = {"size": [0.5, 0.04, 0.04], "divisions": [8, 1, 1]}
     link = {"name": "b", "box": box, "young": 1e6, "poisson": 0.3, "density": 1100.0, "modes": 2,
             "damping": 0.1}  # fmt: skip
@@ -80,7 +80,7 @@ def test_an_elastic_body_beyond_numbers(change: dict[str, float]) -> None:
     with pytest.raises(
         mstmm.SceneError, match=r'elastic "b".*beyond the range of double precision'
     ):
-        soft(**change)
+        soft_body_model(**change)
 
 
 def test_a_static_shape_beyond_the_model_is_said() -> None:
@@ -88,12 +88,12 @@ def test_a_static_shape_beyond_the_model_is_said() -> None:
     with pytest.raises(
         mstmm.NumericalFailure, match=r'"b": the static deformation .*rotates an end by 1.7'
     ):
-        soft(initial="static").initial_state()
+        soft_body_model(initial="static").initial_state()
 
 
 def test_a_start_beyond_the_model_is_named() -> None:
     with pytest.raises(mstmm.NumericalFailure, match=r'"b\.tip" .* section rotates by more than 1'):
-        soft(initial={"eta": [0.0, 0.32]}).simulate(1e-3)
+        soft_body_model(initial={"eta": [0.0, 0.32]}).simulate(1e-3)
 
 
 @pytest.mark.parametrize("force", [1e200, 1e300, 1.7e308])

@@ -37,7 +37,7 @@ def bouncing(lab: Lab) -> Problem:
     return problem
 
 
-def whole(lab: Lab, case: str) -> tuple[Samples, Integrator]:
+def uninterrupted_run(lab: Lab, case: str) -> tuple[Samples, Integrator]:
     method, options = CASES[case]
     run = bouncing(lab).finished_run(method, 1.5, START, **options)
     return run.samples, run
@@ -50,7 +50,7 @@ def equal(a: Samples, b: Samples) -> bool:
 
 @pytest.mark.parametrize("case", CASES)
 def test_slices_and_small_buffers_change_nothing(lab: Lab, case: str) -> None:
-    wanted, reference = whole(lab, case)
+    wanted, reference = uninterrupted_run(lab, case)
     assert wanted.event.any()
     method, options = CASES[case]
     for capacity in (2, 3, 7):
@@ -66,7 +66,7 @@ def test_slices_and_small_buffers_change_nothing(lab: Lab, case: str) -> None:
 
 @pytest.mark.parametrize("case", CASES)
 def test_a_saved_run_continues_bit_for_bit(lab: Lab, case: str) -> None:
-    wanted, reference = whole(lab, case)
+    wanted, reference = uninterrupted_run(lab, case)
     method, options = CASES[case]
     run = bouncing(lab).run(method, 1.5, START, capacity=2, **options)
     parts, sizes = [], set()
@@ -105,7 +105,7 @@ np.savez(folder / "rest.npz", t=run.samples.t, y=run.samples.y, memory=run.sampl
 
 
 def test_another_process_continues_bit_for_bit(lab: Lab, tmp_path: Path) -> None:
-    wanted, _ = whole(lab, "output times")
+    wanted, _ = uninterrupted_run(lab, "output times")
     method, options = CASES["output times"]
     run = bouncing(lab).run(method, 1.5, START, **options)
     while run.t < 0.8:
@@ -142,7 +142,9 @@ def test_a_foreign_state_is_refused(lab: Lab) -> None:
     assert fresh.advance(10.0) is Status.FINISHED
 
 
-def drawn(rng: np.random.Generator) -> tuple[str, float, tuple[float, ...], dict[str, Any]]:
+def random_run_settings(
+    rng: np.random.Generator,
+) -> tuple[str, float, tuple[float, ...], dict[str, Any]]:
     """Method, end, thresholds and answer of three events, and options of a run of the circle."""
     t_end = float(rng.uniform(0.5, 12.0))
     method = str(rng.choice(["rk4", "dopri5", "dop853"]))
@@ -165,7 +167,7 @@ def circling(lab: Lab, events: tuple[float, ...]) -> Problem:
 
 def test_drawn_runs_do_not_depend_on_how_they_are_cut(lab: Lab, rng: np.random.Generator) -> None:
     for _ in range(30):
-        method, t_end, events, options = drawn(rng)
+        method, t_end, events, options = random_run_settings(rng)
         problem, again = circling(lab, events), circling(lab, events)
         wanted = problem.finished_run(method, t_end, START, **options)
         t, y, regular = wanted.samples.t, wanted.samples.y, wanted.samples.event == 0

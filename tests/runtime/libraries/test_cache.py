@@ -158,7 +158,7 @@ def test_unknown_processor_shares_with_no_other_machine(tmp_path: Path) -> None:
 # --- what was changed behind our back -------------------------------------------------------------
 
 
-def _cut(library: Path) -> None:
+def _truncate_file(library: Path) -> None:
     library.write_bytes(library.read_bytes()[:-100])
 
 
@@ -204,7 +204,7 @@ def _a_file(library: Path) -> None:
 
 
 DAMAGES = {
-    "bytes of": _cut,
+    "bytes of": _truncate_file,
     "0 bytes": _empty_file,
     "checksum": _flip_bit,
     "another scene": _of_another,

@@ -50,7 +50,7 @@ def test_trees_with_springs_between_bodies(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(8))
 def test_flexible_bodies(seed: int) -> None:
-    scene, q, _ = engine_scenes.drawn(seed, False, 3)
+    scene, q, _ = engine_scenes.seeded_scene(seed, False, 3)
     for hinge in scene["hinge"]:
         if "drive" in hinge:
             hinge["drive"] = [x if x == "free" else "0.4" for x in hinge["drive"]]

@@ -26,7 +26,9 @@ from tests.support.scenes.linkages import (
 from tests.support.scenes.published_mechanisms import andrews, four_bars
 
 
-def off(model: mstmm.Model, kept: tuple[str, ...], size: float, draw: np.random.Generator) -> Array:
+def perturbed_start(
+    model: mstmm.Model, kept: tuple[str, ...], size: float, draw: np.random.Generator
+) -> Array:
     """The start with all coordinates off by up to `size` (rad, m), but for those of `kept`."""
     start, _ = model.initial_state()
     shift = draw.uniform(-size, size, len(start))
@@ -58,7 +60,7 @@ def test_every_start_nearby_closes(
     """What is held stays to the bit, and no end is off its partner."""
     model, draw = mstmm.compile(mstmm.Scene(**scene)), np.random.default_rng(12)
     for _ in range(starts):
-        wish = off(model, kept, size, draw)
+        wish = perturbed_start(model, kept, size, draw)
         q, u = model.assemble(wish, np.zeros(model.nu), hold=kept)
         for place in (model.coordinate_layout.hinges[name].q_slice for name in kept):
             assert (q[place] == wish[place]).all()

@@ -12,7 +12,7 @@ import mstmm
 from tests.reference import newton_euler as dense
 from tests.reference.compare import worst
 from tests.reference.jets import Array
-from tests.reference.random_loops import random_mechanism, torn
+from tests.reference.random_loops import closure_jacobian, random_mechanism
 from tests.reference.tree import read
 from tests.runtime.packing.loops.test_cut_tree import LAWS, SPEED, signs
 from tests.support import planar_four_bar as planar
@@ -48,7 +48,7 @@ def test_random_mechanisms(seed: int) -> None:
     places = [
         model.coordinate_layout.u_names.index(name) for name in model.loops.independent_speeds
     ]
-    ways = scipy.linalg.null_space(torn(tree, q), rcond=1e-10)
+    ways = scipy.linalg.null_space(closure_jacobian(tree, q), rcond=1e-10)
     assert ways.shape[1] == len(places) == model.loops.mobility
     ways = ways @ np.linalg.inv(ways[places])
     mass = ways.T @ dense.mass_matrix(tree, q) @ ways

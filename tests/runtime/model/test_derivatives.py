@@ -17,7 +17,7 @@ from mstmm.runtime.model.derivatives import Derivatives
 from mstmm.runtime.packing.fused_structure import structure_of
 from mstmm.runtime.packing.system_builder import system_of
 from tests.reference import newton_euler as dense
-from tests.reference.compare import drawn, fresh, worst
+from tests.reference.compare import fresh, seeded_scene, worst
 from tests.reference.jets import Array
 from tests.reference.tree import SIZES
 from tests.support.kernels.complex_arithmetic import complex_step
@@ -47,7 +47,7 @@ def input_directions(model: mstmm.Model, q: Array, draw: Array) -> dict[str, Arr
     return {"q": tangent_of_q(model, q, draw), "u": draw, "efforts": draw, "t": np.ones(1)}
 
 
-def along(found: Derivatives, draw: Array) -> dict[str, Array]:
+def directional_derivatives(found: Derivatives, draw: Array) -> dict[str, Array]:
     columns = {name: getattr(found, name) @ draw for name in ("q", "u", "efforts")}
     return columns | {"t": found.t}
 
@@ -70,11 +70,11 @@ def fifty_digits(kernel: KernelIR, inputs: Arrays, port: str, direction: Array) 
 @pytest.mark.parametrize("seed", range(3))
 def test_fifty_digits(seed: int) -> None:
     """All hinge types, laws, loads and springs, in trees: along a random direction."""
-    scene, q, u = drawn(100 + seed, most=3)
+    scene, q, u = seeded_scene(100 + seed, most=3)
     model = compile_scene(scene)
     kernel, inputs = equations(model, q, u)
     draw = np.random.default_rng(seed).normal(size=model.nu)
-    found = along(model.derivatives(q, u, TIME), draw)
+    found = directional_derivatives(model.derivatives(q, u, TIME), draw)
     for port, direction in input_directions(model, q, draw).items():
         wanted = fifty_digits(kernel, inputs, port, direction)
         assert worst(found[port], wanted, floor=1e-3) < 1e-10, port
@@ -86,7 +86,7 @@ def test_complex_step_on_trees_drawn_afresh(draw: int, rng: np.random.Generator)
     model = compile_scene(scene)
     kernel, inputs = equations(model, q, u)
     increment = rng.normal(size=model.nu)
-    found = along(model.derivatives(q, u, TIME), increment)
+    found = directional_derivatives(model.derivatives(q, u, TIME), increment)
     for port, direction in input_directions(model, q, increment).items():
         wanted = complex_step(kernel, inputs, {port: direction})["udot"]
         assert worst(found[port], wanted, floor=1.0) < 1e-10, port
@@ -95,7 +95,7 @@ def test_complex_step_on_trees_drawn_afresh(draw: int, rng: np.random.Generator)
 @pytest.mark.parametrize("kind", MOVING)
 def test_complex_step_by_hinge_type(kind: str) -> None:
     """Two hinges of one type with every law, columns one by one."""
-    scene, q, u = drawn(7, types=(kind,), most=2, chain=True)
+    scene, q, u = seeded_scene(7, types=(kind,), most=2, chain=True)
     model = compile_scene(scene)
     kernel, inputs = equations(model, q, u)
     found = model.derivatives(q, u, TIME)
@@ -109,7 +109,7 @@ def test_complex_step_by_hinge_type(kind: str) -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_the_independent_dense_equations(seed: int) -> None:
     """Differences of the dense Newton-Euler equations, which share nothing with mstmm."""
-    scene, q, u = drawn(200 + seed, most=5)
+    scene, q, u = seeded_scene(200 + seed, most=5)
     model, step = compile_scene(scene), 1e-5
     found = model.derivatives(q, u, TIME)
     size = max(1.0, float(np.abs(found.q).max()))
@@ -125,7 +125,7 @@ def test_the_independent_dense_equations(seed: int) -> None:
 
 
 def test_batches_are_states_one_by_one() -> None:
-    scene, q, u = drawn(3, most=3)
+    scene, q, u = seeded_scene(3, most=3)
     model = compile_scene(scene)
     names = ["gravity[0]", f"{scene['body'][0]['name']}.mass"]
     states = np.stack([q, 1.1 * q, q]), np.stack([u, u, 2 * u])
@@ -145,7 +145,7 @@ def test_batches_are_states_one_by_one() -> None:
 
 def test_efforts_shift_the_point_of_a_nonlinear_law_not_the_slope() -> None:
     """Accelerations are affine in the efforts, whatever else acts."""
-    scene, q, u = drawn(11, most=3)
+    scene, q, u = seeded_scene(11, most=3)
     model = compile_scene(scene)
     extra = np.random.default_rng(1).normal(size=model.nu)
     plain, pushed = model.derivatives(q, u, TIME), model.derivatives(q, u, TIME, efforts=extra)

@@ -40,12 +40,12 @@ def test_along_closed_motions(scene: dict[str, Any]) -> None:
     q, speed = model.initial_state()[0], 1.7
     found = model.derivatives(q, speed * ways(model, q))
 
-    def ahead(size: float) -> tuple[Array, Array, Array]:
+    def displaced_state(size: float) -> tuple[Array, Array, Array]:
         moved = model.assemble(q + size * ways(model, q))[0]
         u = speed * ways(model, moved)
         return moved, u, model.accelerations(moved, u)
 
-    forward, back = ahead(STEP), ahead(-STEP)
+    forward, back = displaced_state(STEP), displaced_state(-STEP)
     d_q, d_u, wanted = (a - b for a, b in zip(forward, back, strict=True))
     assert worst(found.q @ d_q + found.u @ d_u, wanted) < 1e-6
     assert worst(found.udot, model.accelerations(q, speed * ways(model, q))) < 1e-11

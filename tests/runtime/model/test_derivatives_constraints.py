@@ -38,7 +38,7 @@ def test_along_closed_motions(name: str) -> None:
     driven = np.zeros(model.nu)
     driven[sorted({*range(model.nu)} - {*model.free_speed_indices})] = 10.0
 
-    def ahead(size: float) -> tuple[Array, Array]:
+    def displaced_state(size: float) -> tuple[Array, Array]:
         moved = closed.assemble(q + size * rates, 0 * driven, (), ())[0]
         u = driven + freedom.motion_matrix(moved, places) @ (v + size * dv)
         u = closed.assemble(moved, u, (), ())[1]
@@ -46,7 +46,7 @@ def test_along_closed_motions(name: str) -> None:
 
     ways = freedom.motion_matrix(q, places)
     rates = model.looped.rates(0.0, q, ways @ x, model.looped.start_memory())
-    forward, back, here = ahead(STEP), ahead(-STEP), ahead(0.0)
+    forward, back, here = displaced_state(STEP), displaced_state(-STEP), displaced_state(0.0)
     found = model.derivatives(q, here[0])
     d_u, wanted = (a - b for a, b in zip(forward, back, strict=True))
     assert worst(found.q @ (2 * STEP * ways @ x) + found.u @ d_u, wanted) < 1e-6

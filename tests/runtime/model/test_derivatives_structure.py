@@ -9,7 +9,7 @@ import pytest
 
 from mstmm.errors import NumericalFailure, SceneError
 from mstmm.runtime.engine.tangent_matrix import TangentMatrix
-from tests.reference.compare import drawn, worst
+from tests.reference.compare import seeded_scene, worst
 from tests.reference.jets import Array
 from tests.reference.random_scenes import random_scene
 from tests.support.models import compile_scene
@@ -24,7 +24,7 @@ def pendulum(**hinge: Any) -> dict[str, Any]:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_efforts_see_the_inverse_mass_matrix(seed: int) -> None:
-    scene, q, u = drawn(300 + seed, most=5)
+    scene, q, u = seeded_scene(300 + seed, most=5)
     model = compile_scene(scene)
     inverse = model.derivatives(q, u).efforts
     assert worst(inverse, inverse.T, floor=1e-3) < 1e-12
@@ -84,7 +84,7 @@ def test_increments_of_quaternions_turn_with_the_body() -> None:
 
 
 def test_the_length_of_a_quaternion_does_not_matter() -> None:
-    scene, q, u = drawn(12, types=("ball", "free"), most=3)
+    scene, q, u = seeded_scene(12, types=("ball", "free"), most=3)
     model = compile_scene(scene)
     longer = q.copy()
     for start in model.coordinate_layout.quaternions:
@@ -182,7 +182,7 @@ def test_long_chains_carry_in_a_few_places() -> None:
 @pytest.mark.parametrize("seed", range(6))
 def test_nobody_waits_where_another_does(seed: int) -> None:
     """A place is taken again by bodies that are begun once its body is eliminated."""
-    parents, places = parents_and_places(drawn(700 + seed, most=90)[0])
+    parents, places = parents_and_places(seeded_scene(700 + seed, most=90)[0])
     children: dict[int, list[int]] = {}
     for body, parent in enumerate(parents):
         children.setdefault(parent, []).append(body)

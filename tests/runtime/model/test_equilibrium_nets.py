@@ -24,7 +24,7 @@ def about(angle: float, radius: float = 1.0, height: float = 0.0) -> Array:
     return np.array([radius * np.cos(angle), radius * np.sin(angle), height])
 
 
-def pointing(way: Array) -> list[float]:
+def direction_quaternion(way: Array) -> list[float]:
     """The quaternion that turns z into a direction."""
     axis = np.cross([0, 0, 1], way / np.linalg.norm(way))
     half = np.arcsin(np.linalg.norm(axis)) / 2
@@ -58,7 +58,7 @@ def prism(gravity: float, pulls_only: bool) -> dict[str, Any]:
                 "inboard": "ground",
                 "outboard": f"strut{k}",
                 "position": foot.tolist(),
-                "initial": {"q": pointing(top - foot)},
+                "initial": {"q": direction_quaternion(top - foot)},
             }
         )
         after = (k + 1) % 3

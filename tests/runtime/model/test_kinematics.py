@@ -28,7 +28,7 @@ ROD: dict[str, Any] = {
 }  # fmt: skip
 
 
-def every(rng: np.random.Generator) -> Drawn:
+def random_kinematic_scene(rng: np.random.Generator) -> Drawn:
     return fresh(rng, laws=False, loads=False)
 
 
@@ -56,7 +56,7 @@ def jacobian(scene: dict[str, Any], q: Any, nu: int) -> Any:
 
 @pytest.mark.parametrize("_", draws(4, 12))
 def test_places_velocities_and_jacobians(_: int, rng: np.random.Generator) -> None:
-    scene, q, u = every(rng)
+    scene, q, u = random_kinematic_scene(rng)
     model, names, tree = mstmm.compile(mstmm.Scene(**scene)), points_of(scene), read(scene)
     at = newton_euler.motion(scene, q, u)
     poses = model.poses(q, names)
@@ -72,7 +72,7 @@ def test_places_velocities_and_jacobians(_: int, rng: np.random.Generator) -> No
 @pytest.mark.parametrize("_", draws(4, 12))
 def test_the_rate_of_jacobians(_: int, rng: np.random.Generator) -> None:
     """Its product with the speeds as the reference has it, each column by its differences."""
-    scene, q, u = every(rng)
+    scene, q, u = random_kinematic_scene(rng)
     model, names, tree = mstmm.compile(mstmm.Scene(**scene)), points_of(scene), read(scene)
     rate, udot = model.jacobian_rate(q, u, names), rng.uniform(-1, 1, model.nu)
     solved, at = newton_euler.solve(scene, q, u, udot=udot), newton_euler.motion(scene, q, u)

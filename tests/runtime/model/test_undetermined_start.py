@@ -22,7 +22,7 @@ def _tip(kind: str, inertia: tuple[float, ...], center: tuple[float, ...] = (0.5
     return scene
 
 
-def _massless(kind: str) -> Any:
+def _massless_tip_scene(kind: str) -> Any:
     scene = chain(["pin", kind])
     scene["body"][1] = {"name": "rod1", "mass": 0.0, "ends": scene["body"][1]["ends"]}
     return scene
@@ -38,10 +38,10 @@ UNDETERMINED = {
     "thin rod on springs": _tip("elastic", (0, ROD, ROD)),
     "point mass on a gimbal": _tip("gimbal", (0, 0, 0), (0, 0, 0)),
     "point mass that slides and turns": _tip("cylindrical", (0, 0, 0), (0, 0, 0.4)),
-    "massless tip on a pin": _massless("pin"),
-    "massless tip on a slider": _massless("prismatic"),
-    "massless tip on a ball": _massless("ball"),
-    "massless body in free flight": _massless("free"),
+    "massless tip on a pin": _massless_tip_scene("pin"),
+    "massless tip on a slider": _massless_tip_scene("prismatic"),
+    "massless tip on a ball": _massless_tip_scene("ball"),
+    "massless body in free flight": _massless_tip_scene("free"),
 }
 
 

@@ -17,7 +17,7 @@ from mstmm.runtime.packing import scene_parameters
 from mstmm.runtime.packing.fused_structure import structure_of
 from mstmm.runtime.packing.parameter_derivatives import parameter_derivatives
 from mstmm.runtime.packing.system_builder import system_of
-from tests.reference.compare import drawn, worst
+from tests.reference.compare import seeded_scene, worst
 from tests.reference.jets import Array
 from tests.reference.random_scenes import aligned_chain, random_state
 
@@ -33,7 +33,7 @@ def eighth_order(f: Any, step: float) -> Array:
 
 
 def scene_of(seed: int, **options: Any) -> tuple[mstmm.Scene, Array, Array]:
-    data, q, u = drawn(seed, **options)
+    data, q, u = seeded_scene(seed, **options)
     # Steps of some per cent may violate the triangle inequality of an inertia.
     data["allow_unphysical_inertia"] = True
     for body in data["body"]:

@@ -161,7 +161,7 @@ def _two_roots(scene: dict[str, Any]) -> None:
     scene["hinge"][2]["inboard"] = "ground"
 
 
-def _driven(scene: dict[str, Any]) -> None:
+def _drive_hinge(scene: dict[str, Any]) -> None:
     scene["hinge"][1]["drive"] = "sin(t)"
 
 
@@ -169,7 +169,7 @@ def _rotor(scene: dict[str, Any]) -> None:
     scene["hinge"][1]["law"] = {"inertia": 0.1}
 
 
-def _massless(scene: dict[str, Any]) -> None:
+def _remove_mass(scene: dict[str, Any]) -> None:
     scene["body"][1] = {"name": "rod1", "mass": 0.0, "ends": scene["body"][1]["ends"]}
 
 
@@ -178,9 +178,9 @@ def _massless(scene: dict[str, Any]) -> None:
     [
         pytest.param(_branch_chain, "unbranched chain", id="_branched-unbranched chain"),
         (_two_roots, "unbranched chain"),
-        (_driven, 'hinge "hinge1".*drives'),
+        pytest.param(_drive_hinge, 'hinge "hinge1".*drives', id='_driven-hinge "hinge1".*drives'),
         (_rotor, 'hinge "hinge1".*rotor'),
-        (_massless, 'body "rod1".*mass'),
+        pytest.param(_remove_mass, 'body "rod1".*mass', id='_massless-body "rod1".*mass'),
     ],
 )
 def test_scenes_without_a_matrix_are_named(change: Any, named: str) -> None:

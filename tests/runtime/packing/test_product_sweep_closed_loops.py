@@ -53,7 +53,7 @@ def on_an_arm() -> Scene:
     return scene | {"body": bodies, "hinge": [swing, *scene["hinge"]]}
 
 
-def both(scene: Scene, accuracy: float) -> tuple[mstmm.Model, mstmm.Model]:
+def product_and_default_models(scene: Scene, accuracy: float) -> tuple[mstmm.Model, mstmm.Model]:
     made = mstmm.Scene(**scene)
     return mstmm.compile(made, sweep="product", accuracy=accuracy), mstmm.compile(made)
 
@@ -68,7 +68,7 @@ SCENES: dict[str, Callable[[], Scene]] = {
 
 @pytest.mark.parametrize("name", SCENES)
 def test_accelerations_are_those_of_the_sweep(name: str) -> None:
-    product, sweep = both(SCENES[name](), 1e-10)
+    product, sweep = product_and_default_models(SCENES[name](), 1e-10)
     q, u = sweep.initial_state()
     efforts = np.random.default_rng(4).uniform(-1, 1, sweep.nu)
     for given in (None, efforts):
@@ -78,7 +78,7 @@ def test_accelerations_are_those_of_the_sweep(name: str) -> None:
 
 
 def test_motions_agree() -> None:
-    product, sweep = both(four_bar(speed=1.0, cut="end", laws=LAWS), 1e-10)
+    product, sweep = product_and_default_models(four_bar(speed=1.0, cut="end", laws=LAWS), 1e-10)
     options: dict[str, Any] = {"rtol": 1e-9, "output_times": [0.0, 0.5, 1.0]}
     found, wanted = product.simulate(1.0, **options), sweep.simulate(1.0, **options)
     assert found.success, found.message
@@ -90,7 +90,7 @@ def test_digits_go_along_a_closed_chain_as_along_an_open_one() -> None:
     """Ten times as wrong with every rod or two, until the accuracy asked for is lost by name."""
     errors = []
     for count in (4, 8, 12):
-        product, sweep = both(rope("pin", count), 1.0)
+        product, sweep = product_and_default_models(rope("pin", count), 1.0)
         q, u = sweep.initial_state()
         errors.append(worst(product.accelerations(q, u), sweep.accelerations(q, u)))
     assert errors[0] < 1e-11

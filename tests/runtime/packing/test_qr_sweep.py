@@ -13,7 +13,7 @@ from mstmm.errors import SceneError
 from mstmm.pipeline.extended_precision import extended_precision_accelerations, relative_error
 from tests.reference import newton_euler as dense
 from tests.reference import random_scenes
-from tests.reference.compare import drawn, fresh, worst
+from tests.reference.compare import fresh, seeded_scene, worst
 from tests.reference.jets import Array
 from tests.reference.tree import SIZES
 from tests.support.scenes.rods import chain, drawn_state
@@ -50,7 +50,7 @@ def compare(scene: dict[str, Any], q: Array, u: Array) -> None:
 
 @pytest.mark.parametrize("seed", range(300, 330))
 def test_random_trees(seed: int) -> None:
-    compare(*drawn(seed))
+    compare(*seeded_scene(seed))
 
 
 @pytest.mark.parametrize("kind", SIZES)

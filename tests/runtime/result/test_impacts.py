@@ -12,7 +12,7 @@ Scene = dict[str, Any]
 STOPS = {"limits": {"lower": -0.5, "upper": 0.5, "restitution": 0.7}}
 
 
-def free(body: str, place: list[float], speeds: list[float]) -> Scene:
+def free_hinge(body: str, place: list[float], speeds: list[float]) -> Scene:
     start = {"q": [*place, 1, 0, 0, 0], "u": speeds}
     return {"name": f"f{body}", "type": "free", "inboard": "ground", "outboard": body,
             "initial": start}  # fmt: skip
@@ -44,10 +44,10 @@ def conserved_momenta(scene: Scene, **settings: Any) -> set[str]:
             for drift in run.certificate.momentum}  # fmt: skip
 
 
-BALL = [free("a", [0, 1, 0], [1, 0, 0.3, 0, 0, 0])]
+BALL = [free_hinge("a", [0, 1, 0], [1, 0, 0.3, 0, 0, 0])]
 PAIR = [
-    free("a", [0, 0, 0], [1, 0.1, 0.05, 0, 0, 1]),
-    free("b", [1, 0.02, 0], [0, 0, 0.08, 0.3, 0, 0.2]),
+    free_hinge("a", [0, 0, 0], [1, 0.1, 0.05, 0, 0, 1]),
+    free_hinge("b", [1, 0.02, 0], [0, 0, 0.08, 0.3, 0, 0.2]),
 ]
 
 
@@ -69,7 +69,7 @@ def test_a_ball_between_floor_and_wall(method: str) -> None:
 )
 def test_a_wall_that_moves(when: str, kept: set[str]) -> None:
     """What is pushed against the wall's normal is its own affair, and what turns about that."""
-    fast = [free("a", [0, 1.2, 0.1], [1, -1, 0.3, 0.1, 0.2, 0])]
+    fast = [free_hinge("a", [0, 1.2, 0.1], [1, -1, 0.3, 0.1, 0.2, 0])]
     assert conserved_momenta({"body": bodies("a"), "hinge": fast, "event": events(when)}) == kept
 
 
@@ -105,7 +105,7 @@ def test_hard_stops_inside_a_scene() -> None:
     """All of a free pair's momentum is kept; of what runs across a rail nothing is that the rail
     bears, though only blows bring it to bear."""
     pin = hinge("knee", "pin", "a", "b", 2.0, law=STOPS)
-    flying = [free("a", [0, 0, 0], [1, 0.2, 0.1, 0, 0, 1]), pin]
+    flying = [free_hinge("a", [0, 0, 0], [1, 0.2, 0.1, 0, 0, 1]), pin]
     every = {"x", "y", "z", "angular x", "angular y", "angular z"}
     assert conserved_momenta({"body": bodies("a", "b"), "hinge": flying}) == every
     rail = hinge("rail", "prismatic", "ground", "a", 1.0, axis=[1, 0, 0])
@@ -131,7 +131,7 @@ def test_a_hub_with_a_blade() -> None:
              "basis": "static+fixed-interface"}  # fmt: skip
     weld = {"name": "weld", "type": "fixed", "inboard": "a", "outboard": "blade"}
     ring = hinge("ring", "pin", "blade.tip", "b", 3.0, law=STOPS)
-    flying = [free("a", [0, 0, 0], [0.1, 0.2, 0, 0, 0, 1.0]), weld, ring]
+    flying = [free_hinge("a", [0, 0, 0], [0.1, 0.2, 0, 0, 0, 1.0]), weld, ring]
     scene = {"gravity": [0, 0, 0], "body": bodies("a", "b"), "beam": [blade], "hinge": flying}
     run = mstmm.compile(mstmm.Scene(**scene), engine="looped").simulate(0.3, certify=True)
     assert (run.event > 0).any()
@@ -144,7 +144,8 @@ def test_blows_between_output_times_are_not_forgotten() -> None:
     """No sample shows them, so that nothing is known of what they have left."""
     scene = {
         "gravity": [0, 0, 0], "body": bodies("ball"),
-        "hinge": [free("ball", [0, 0, 0], [1, 0.2, 0, 0, 0, 0.5])], "event": events("ball.x > 1"),
+        "hinge": [free_hinge("ball", [0, 0, 0], [1, 0.2, 0, 0, 0, 0.5])],
+        "event": events("ball.x > 1"),
     }  # fmt: skip
     assert "y" in conserved_momenta(scene)
     model = mstmm.compile(mstmm.Scene(**scene), engine="looped")

@@ -149,11 +149,11 @@ def test_a_run_is_made_again_as_far_as_it_came(monkeypatch: pytest.MonkeyPatch) 
     assert run.success and run.last_state[0] == pytest.approx(6.7, abs=0.01)
     ends, real = list[float](), run_execution.first_run
 
-    def again(model: Any, settings: Settings, *rest: Any) -> Trajectory:
+    def record_end_and_run(model: Any, settings: Settings, *rest: Any) -> Trajectory:
         ends.append(settings.t_end)
         return real(model, settings, *rest)
 
-    monkeypatch.setattr(narrow_features, "first_run", again)
+    monkeypatch.setattr(narrow_features, "first_run", record_end_and_run)
     assert [risk.name for risk in missed_feature_risks(run.model, run.trajectory)] == [
         "narrow-load"
     ]

@@ -16,7 +16,7 @@ from tests.support.scenes.results import motor, pins, rod
 ESTIMATING = [method for method in IMPLICIT if get(method).adaptive]
 
 
-def swung(step: float, method: str | mstmm.methods.Method, **more: Any) -> Result:
+def simulate_rods(step: float, method: str | mstmm.methods.Method, **more: Any) -> Result:
     """Two rods that swing from near the horizontal."""
     model = mstmm.compile(pins(2, [-0.3, 0.2]), engine="looped")
     return model.simulate(2.0, method, step, **more)
@@ -29,19 +29,21 @@ def step_warnings(result: Result) -> list[str]:
 @pytest.mark.parametrize("method", ["genalpha", "dttmm", "hht", "newmark", "rodas4", "rodas4p2"])
 def test_a_step_that_misses_the_motion_is_named_with_one_that_does_not(method: str) -> None:
     step = 0.15 if get(method).order == 2 else 0.1
-    (text,) = step_warnings(swung(step, method))
+    (text,) = step_warnings(simulate_rods(step, method))
     assert text.startswith(f"step = {step} s is too long for the motion")
     found = re.search(r"steps (\d+)% of the distance .* use a step below ([\d.]+) s", text)
     assert found is not None
     assert int(found[1]) >= 2
     shorter = float(found[2])
     assert step / 10 < shorter < step
-    assert not step_warnings(swung(0.9 * shorter, method, output_times=np.linspace(0.0, 2.0, 41)))
+    assert not step_warnings(
+        simulate_rods(0.9 * shorter, method, output_times=np.linspace(0.0, 2.0, 41))
+    )
 
 
 @pytest.mark.parametrize("method", ESTIMATING)
 def test_a_step_that_resolves_the_motion_is_not(method: str) -> None:
-    result = swung(0.01, method)
+    result = simulate_rods(0.01, method)
     assert result.success
     assert not step_warnings(result)
 
@@ -49,8 +51,8 @@ def test_a_step_that_resolves_the_motion_is_not(method: str) -> None:
 @pytest.mark.parametrize("method", ["genalpha", "wilson", "rodas4p2"])
 def test_a_step_longer_than_the_run_is_named(method: str) -> None:
     words = "is longer than the run"
-    assert any(words in text for text in swung(2.1, method).warnings)
-    assert not any(words in text for text in swung(2.0, method).warnings)
+    assert any(words in text for text in simulate_rods(2.1, method).warnings)
+    assert not any(words in text for text in simulate_rods(2.0, method).warnings)
 
 
 def test_the_length_of_a_run_does_not_matter() -> None:
@@ -89,5 +91,5 @@ def test_what_rests_is_not_said_to_be_missed() -> None:
 
 def test_a_longest_step_beside_a_fixed_one_is_refused() -> None:
     with pytest.raises(mstmm.SceneError, match=r"max_step = 0\.1: .* step = 0\.01 fixes all steps"):
-        swung(0.01, mstmm.methods.Method("genalpha", max_step=0.1))
-    assert swung(0.01, mstmm.methods.Method("genalpha", max_step=np.inf)).success
+        simulate_rods(0.01, mstmm.methods.Method("genalpha", max_step=0.1))
+    assert simulate_rods(0.01, mstmm.methods.Method("genalpha", max_step=np.inf)).success

@@ -15,7 +15,11 @@ import mstmm
 from mstmm.runtime.engine.jacobian import OdeJacobian
 from mstmm.runtime.run.scene_system import SceneSystem
 from tests.reference.jets import Array
-from tests.runtime.engine.test_tangent_matrix import flexible, rigid, worst
+from tests.runtime.engine.test_tangent_matrix import (
+    random_flexible_scene,
+    random_rigid_scene,
+    worst,
+)
 from tests.support.implicit_methods import motions
 
 Scene = dict[str, Any]
@@ -80,13 +84,13 @@ def check(scene: Scene, q: Array, u: Array) -> None:
 
 @pytest.mark.parametrize("draw", range(6))
 def test_rigid_trees(draw: int, rng: Generator) -> None:
-    check(*rigid(rng))
+    check(*random_rigid_scene(rng))
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
 @pytest.mark.parametrize("draw", range(3))
 def test_flexible_trees(draw: int, rng: Generator) -> None:
-    check(*flexible(rng, draw % 2 == 0))
+    check(*random_flexible_scene(rng, draw % 2 == 0))
 
 
 def test_a_beam_has_the_derivatives_that_users_are_told() -> None:

@@ -39,7 +39,7 @@ def stiff_tree(seed: int) -> tuple[mstmm.Model, Array, Array]:
     return mstmm.compile(mstmm.Scene(**scene), engine="looped"), q, u
 
 
-def both(model: mstmm.Model, q: Array, u: Array) -> tuple[float, float]:
+def estimated_and_exact_radius(model: mstmm.Model, q: Array, u: Array) -> tuple[float, float]:
     """|lambda| by power iterations of the laws alone, and of the dense matrix of everything."""
     memory = model.looped.start_memory()
     value, _ = fastest_eigenvalue(model.looped, 0.3, np.concatenate([q, u]), memory)
@@ -50,7 +50,7 @@ def test_stiff_random_trees() -> None:
     ratios = []
     for seed in range(TREES):
         model, q, u = stiff_tree(seed)
-        found, exact = both(model, q, u) if model.nu else (0.0, 0.0)
+        found, exact = estimated_and_exact_radius(model, q, u) if model.nu else (0.0, 0.0)
         if exact > STIFF:
             ratios.append(found / exact)
     assert len(ratios) > TREES / 2
@@ -64,7 +64,7 @@ def test_stiff_random_trees() -> None:
 def test_stiff_scenes(name: str) -> None:
     """Bushings, beams with and without damping, springs between bodies and dampers."""
     model = mstmm.compile(mstmm.Scene(**CASES[name].scene()), engine="looped")
-    found, exact = both(model, *model.initial_state())
+    found, exact = estimated_and_exact_radius(model, *model.initial_state())
     assert 0.85 * exact < found < 1.1 * exact
     assert 0.85 * exact < fastest_at_start(model.looped, 0.0, *model.initial_state()) < 1.1 * exact
 
@@ -91,7 +91,7 @@ def test_many_bodies_cost_no_more_columns() -> None:
     scene = pins(150, [0.1] * 150, stiffness=10.0).model_dump(mode="json")
     scene["hinge"][97]["law"]["stiffness"] = [1e7]
     model = mstmm.compile(mstmm.Scene(**scene), engine="looped")
-    found, exact = both(model, *model.initial_state())
+    found, exact = estimated_and_exact_radius(model, *model.initial_state())
     assert 0.85 * exact < found < 1.1 * exact
 
 

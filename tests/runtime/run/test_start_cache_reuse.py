@@ -39,7 +39,7 @@ def run(model: mstmm.Model, q: Any, method: str = "dop853", **more: Any) -> mstm
     return model.simulate(1.0, method, output_times=TIMES, initial=(q, [0.0] * 4), **more)
 
 
-def same(one: mstmm.Result, other: mstmm.Result) -> bool:
+def are_same_runs(one: mstmm.Result, other: mstmm.Result) -> bool:
     a, b = one.trajectory, other.trajectory
     arrays = ("t", "q", "u", "memory", "work", "event")
     return a.message == b.message and all(
@@ -60,7 +60,7 @@ def test_every_run_is_as_a_first_one(engine: str, monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(start_cache, "_MAX_STATES", 0)
     for (q, each), found in zip(asked, later, strict=True):
         first = mstmm.compile(scene(), engine=engine)
-        assert same(run(first, q, **each), found)
+        assert are_same_runs(run(first, q, **each), found)
         assert first not in start_cache._last_caches
 
 
@@ -73,16 +73,16 @@ def test_among_closed_loops(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(start_cache, "_MAX_STATES", 0)
     for one, found in zip(how, later, strict=True):
         first = mstmm.compile(four_bar, engine="looped")
-        assert same(first.simulate(0.2, one, step=2e-3, output_times=[0.2]), found), one
+        assert are_same_runs(first.simulate(0.2, one, step=2e-3, output_times=[0.2]), found), one
 
 
 def test_other_times_and_other_models_begin_anew() -> None:
     model = mstmm.compile(scene(), engine="looped")
     expected = [model.simulate(t, initial=(STARTS[0], [0.0] * 4)) for t in (0.4, 0.9, 0.4)]
-    assert same(expected[0], expected[2]) and not same(expected[0], expected[1])
+    assert are_same_runs(expected[0], expected[2]) and not are_same_runs(expected[0], expected[1])
     pushed = model.with_inputs({"push": 3.0})
-    assert not same(run(pushed, STARTS[0]), run(model, STARTS[0]))
-    assert same(run(pushed, STARTS[0]), run(pushed, STARTS[0]))
+    assert not are_same_runs(run(pushed, STARTS[0]), run(model, STARTS[0]))
+    assert are_same_runs(run(pushed, STARTS[0]), run(pushed, STARTS[0]))
 
 
 def test_threads_have_each_their_own() -> None:
@@ -96,7 +96,7 @@ def test_threads_have_each_their_own() -> None:
         one.start()
     for one in threads:
         one.join()
-    assert len(found) == 20 and all(same(one, expected) for one in found)
+    assert len(found) == 20 and all(are_same_runs(one, expected) for one in found)
 
 
 @pytest.mark.parametrize("engine", ["looped", "fused"])

@@ -130,7 +130,7 @@ def test_a_spring_whose_ends_coincide_at_the_start_is_named(method: str) -> None
     assert str(run.certificate) and len(run.t) == 1
 
 
-def bent(**more: Any) -> mstmm.Scene:
+def bent_blade_scene(**more: Any) -> mstmm.Scene:
     """A blade bent so far that its tip turns by more than a section may."""
     beam = {"name": "blade", "length": 1.0, "mass_per_length": 1.0, "bending_stiffness": 1.0,
             "modes": {"y": 1}, "initial": {"eta": [2.0]}, "damping": 0.1}  # fmt: skip
@@ -143,11 +143,13 @@ def test_a_start_that_cannot_be_shown_is_refused_by_its_own_reason() -> None:
     with pytest.raises(
         mstmm.NumericalFailure, match=r'"blade\.tip" at t = 0 s: a section rotates by'
     ):
-        mstmm.compile(bent()).simulate(0.1)
+        mstmm.compile(bent_blade_scene()).simulate(0.1)
 
 
 def test_a_start_beyond_the_model_s_range_has_a_certificate_all_the_same() -> None:
-    run = mstmm.compile(bent(load=[{"on": "blade.tip", "force": [0, 0.1, 0]}])).simulate(0.1)
+    run = mstmm.compile(
+        bent_blade_scene(load=[{"on": "blade.tip", "force": [0, 0.1, 0]}])
+    ).simulate(0.1)
     assert run.status is Status.RHS_FAILED and '"blade.tip" at t = 0 s' in run.message
     assert str(run.certificate) and any("blade.tip" in text for text in run.warnings)
 

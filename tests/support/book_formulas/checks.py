@@ -14,7 +14,7 @@ from mstmm.derive.equations.newton_euler import A0, OMEGA, OMEGADOT, V0, X0
 from tests.support.book_formulas import transcripts as printed
 
 
-def same(left: sp.Basic, right: sp.Basic) -> bool:
+def are_identical(left: sp.Basic, right: sp.Basic) -> bool:
     """Whether two columns or expressions agree identically (as polynomials)."""
     difference = sp.Matrix([left]) - sp.Matrix([right])
     return all(sp.expand(entry) == 0 for entry in difference)
@@ -24,13 +24,15 @@ def field_misprint() -> bool:
     """(2.18): the last rate of the y component is that of omega_x."""
     derived = ne.acceleration_field()
     corrected = printed.acceleration_field(OMEGADOT[0])
-    return same(derived, corrected) and not same(derived, printed.acceleration_field(OMEGADOT[2]))
+    return are_identical(derived, corrected) and not are_identical(
+        derived, printed.acceleration_field(OMEGADOT[2])
+    )
 
 
 def moments_of_element() -> bool:
     """(2.20) is r x a."""
     a = Matrix(sp.symbols("a_x a_y a_z"))
-    return same(printed.moment(a, POINT), tilde(POINT) * a)
+    return are_identical(printed.moment(a, POINT), tilde(POINT) * a)
 
 
 def density() -> bool:
@@ -53,14 +55,14 @@ def mass_integrals() -> bool:
     weighted = dict(zip(entries, (rho * v for v in volume), strict=True))
     derived = ne.euler_form().xreplace(weighted)
     form = printed.euler_general()
-    return same(derived, form.xreplace(weighted)) and not same(
+    return are_identical(derived, form.xreplace(weighted)) and not are_identical(
         derived, form.xreplace(dict(zip(entries, volume, strict=True)))
     )
 
 
 def general_form() -> bool:
     """(2.22) as printed is the integrated form."""
-    return same(ne.euler_form(), printed.euler_general())
+    return are_identical(ne.euler_form(), printed.euler_general())
 
 
 def tensor_sign() -> bool:
@@ -87,8 +89,8 @@ def tensor_sign() -> bool:
     return (
         is_tensor(lambda b: b.inertia)
         and not is_tensor(printed.inertia_array)
-        and same(characteristic, sp.det(printed.characteristic_array(body, root)))
-        and not same(
+        and are_identical(characteristic, sp.det(printed.characteristic_array(body, root)))
+        and not are_identical(
             sp.det(root * sp.eye(3) - printed.inertia_array(body)),
             sp.det(printed.characteristic_array(body, root)),
         )
@@ -102,12 +104,14 @@ def moment_point() -> bool:
     velocity = ne.rate(Matrix(X0 + POINT))
     about_inertial = ne.rate(body.integral(tilde(Matrix(X0 + POINT)) * velocity))
     shift = tilde(X0) * ne.inertial_force(body)
-    return same(about_inertial, about_o + shift) and not same(about_inertial, about_o)
+    return are_identical(about_inertial, about_o + shift) and not are_identical(
+        about_inertial, about_o
+    )
 
 
 def principal() -> bool:
     """(2.24): no products of inertia."""
-    return same(ne.euler_form(ne.principal_axes(general())), printed.euler_principal())
+    return are_identical(ne.euler_form(ne.principal_axes(general())), printed.euler_principal())
 
 
 def special_origin() -> bool:
@@ -115,7 +119,9 @@ def special_origin() -> bool:
     body = general()
     central = ne.euler_form(ne.about_mass_center(body))
     fixed = ne.with_unaccelerated_origin(ne.euler_form(body))
-    return same(central, printed.euler_reduced()) and same(fixed, printed.euler_reduced())
+    return are_identical(central, printed.euler_reduced()) and are_identical(
+        fixed, printed.euler_reduced()
+    )
 
 
 def axes_not_in_body() -> bool:
@@ -130,10 +136,10 @@ def axes_not_in_body() -> bool:
     moment = inertia_rate * OMEGA + inertia * OMEGADOT + tilde(turn) * inertia * OMEGA
     missing = inertia * tilde(turn) * OMEGA
     form = printed.euler_reduced()
-    agrees = same(moment, form + missing)
+    agrees = are_identical(moment, form + missing)
     parallel = dict(zip(turn, sp.Symbol("k") * OMEGA, strict=True))
-    special = same(moment.subs(parallel), form)
-    return agrees and special and not same(moment, form)
+    special = are_identical(moment.subs(parallel), form)
+    return agrees and special and not are_identical(moment, form)
 
 
 def reduced_principal() -> bool:
@@ -141,13 +147,15 @@ def reduced_principal() -> bool:
     body = ne.principal_axes(ne.about_mass_center(general()))
     fixed = ne.with_unaccelerated_origin(ne.euler_form(ne.principal_axes(general())))
     form = printed.euler_reduced_principal()
-    return same(ne.euler_form(body), form) and same(fixed, form)
+    return are_identical(ne.euler_form(body), form) and are_identical(fixed, form)
 
 
 def parallel_axes() -> bool:
     """Axes both fixed in the body and parallel to inertial ones leave no angular velocity."""
     relative = ne.rate(POINT)
-    return same(relative, tilde(OMEGA) * POINT) and not same(relative, sp.zeros(3, 1))
+    return are_identical(relative, tilde(OMEGA) * POINT) and not are_identical(
+        relative, sp.zeros(3, 1)
+    )
 
 
 def element_acceleration() -> bool:
@@ -155,7 +163,9 @@ def element_acceleration() -> bool:
     t = sp.Symbol("t")
     origin, local = sp.Function("X0")(t), sp.Function("x")(t)
     full = sp.diff(origin + local, t, 2)
-    return same(full - local.diff(t, 2), origin.diff(t, 2)) and not same(full, local.diff(t, 2))
+    return are_identical(full - local.diff(t, 2), origin.diff(t, 2)) and not are_identical(
+        full, local.diff(t, 2)
+    )
 
 
 def momentum_rate() -> bool:
@@ -164,7 +174,7 @@ def momentum_rate() -> bool:
     position = Matrix(X0 + POINT)
     velocity = ne.rate(position)
     left = ne.rate(body.integral(tilde(position) * velocity))
-    return same(left, body.integral(tilde(position) * ne.acceleration_field()))
+    return are_identical(left, body.integral(tilde(position) * ne.acceleration_field()))
 
 
 def split_moment() -> bool:
@@ -172,7 +182,7 @@ def split_moment() -> bool:
     split = printed.split_moment(second_line=POINT[2])
     position = Matrix(printed.ORIGIN + POINT)
     whole = printed.moment(Matrix(printed.ORIGIN_DD + printed.LOCAL_DD), position)
-    return same(whole, split) and not same(
+    return are_identical(whole, split) and not are_identical(
         whole, printed.split_moment(second_line=printed.ORIGIN[2])
     )
 
@@ -181,7 +191,7 @@ def first_moments() -> bool:
     """(2.32a): the origin's acceleration comes out of the integrals."""
     body = general()
     left = body.integral(printed.moment(printed.ORIGIN_DD, POINT))
-    return same(left, body.mass * printed.moment(printed.ORIGIN_DD, body.center))
+    return are_identical(left, body.mass * printed.moment(printed.ORIGIN_DD, body.center))
 
 
 def moment_about_origin() -> bool:
@@ -189,13 +199,13 @@ def moment_about_origin() -> bool:
     f = Matrix(sp.symbols("f_x f_y f_z"))
     position = Matrix(printed.ORIGIN + POINT)
     left = printed.moment(f, position)
-    return same(left, printed.moment(f, printed.ORIGIN) + printed.moment(f, POINT))
+    return are_identical(left, printed.moment(f, printed.ORIGIN) + printed.moment(f, POINT))
 
 
 def relative_form() -> bool:
     """(2.35) with the inertial rate of h is the integrated form."""
     body = general()
-    return same(ne.relative_momentum_form(body), ne.euler_form(body))
+    return are_identical(ne.relative_momentum_form(body), ne.euler_form(body))
 
 
 def missing_gyroscopic_term() -> bool:
@@ -207,9 +217,9 @@ def missing_gyroscopic_term() -> bool:
     in_body = Matrix(body.mass * tilde(body.center) * A0 + ne.component_rate(momentum))
     missing = tilde(OMEGA) * momentum
     return (
-        same(as_printed, sp.zeros(3, 1))
-        and same(in_body + missing, ne.euler_form(body))
-        and not same(in_body, ne.euler_form(body))
+        are_identical(as_printed, sp.zeros(3, 1))
+        and are_identical(in_body + missing, ne.euler_form(body))
+        and not are_identical(in_body, ne.euler_form(body))
     )
 
 
@@ -217,7 +227,10 @@ def needs_angular_velocity() -> bool:
     """h holds omega and the second moments of the mass: neither can be left out."""
     body = general()
     momentum = ne.relative_momentum(body)
-    return same(momentum, body.inertia * OMEGA) and momentum.free_symbols >= {*OMEGA, *body.moments}
+    return are_identical(momentum, body.inertia * OMEGA) and momentum.free_symbols >= {
+        *OMEGA,
+        *body.moments,
+    }
 
 
 def reduced_momentum() -> bool:
@@ -226,7 +239,7 @@ def reduced_momentum() -> bool:
     momentum = ne.relative_momentum(body)
     fixed = ne.with_unaccelerated_origin(ne.euler_form(body))
     central = ne.about_mass_center(body)
-    return same(ne.rate(momentum), fixed) and same(
+    return are_identical(ne.rate(momentum), fixed) and are_identical(
         ne.rate(ne.relative_momentum(central)), ne.euler_form(central)
     )
 

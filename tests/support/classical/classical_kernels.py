@@ -28,14 +28,18 @@ def kernel(derivation: Derivation) -> KernelIR:
 
 def run(kernel_ir: KernelIR, **inputs: Any) -> dict[str, Array]:
     """Outputs as arrays in their shapes, in doubles."""
-    values = evaluate_floats(kernel_ir, {name: _flat(value) for name, value in inputs.items()})
+    values = evaluate_floats(
+        kernel_ir, {name: _flat_entries(value) for name, value in inputs.items()}
+    )
     ports = {port.name: port for port in kernel_ir.outputs}
     return {name: np.array(row).reshape(_shape(ports[name].shape)) for name, row in values.items()}
 
 
 def run_precisely(kernel_ir: KernelIR, **inputs: Any) -> dict[str, mpmath.matrix]:
     """Outputs as mpmath matrices, at 50 digits."""
-    values = evaluate(kernel_ir, {name: _flat(value) for name, value in inputs.items()}, digits=50)
+    values = evaluate(
+        kernel_ir, {name: _flat_entries(value) for name, value in inputs.items()}, digits=50
+    )
     ports = {port.name: port for port in kernel_ir.outputs}
     result = {}
     for name, row in values.items():
@@ -51,7 +55,7 @@ def _shape(shape: tuple[int | str, ...]) -> tuple[int, int]:
     return rows, int(shape[1]) if len(shape) > 1 else 1
 
 
-def _flat(value: Any) -> list[Any]:
+def _flat_entries(value: Any) -> list[Any]:
     if isinstance(value, mpmath.matrix):
         return list(value)
     return [float(entry) for entry in np.asarray(value, dtype=float).ravel()]

@@ -121,7 +121,7 @@ class _System:
     def wrench(self, k: int) -> slice:
         return slice(int(self.starts[k]) + 6, int(self.starts[k]) + 12)
 
-    def free(self, k: int) -> slice:
+    def free_slice(self, k: int) -> slice:
         return slice(int(self.starts[k]) + 12, int(self.starts[k + 1]))
 
     def add(self, blocks: dict[tuple[int, int], Array], right: Array) -> None:
@@ -149,7 +149,7 @@ class _System:
         right = joint.bias.copy()
         blocks = {
             _span(self.motion(k)): _wrench_shift(-body.r_ic).T,
-            _span(self.free(k)): -joint.subspace,
+            _span(self.free_slice(k)): -joint.subspace,
         }
         right[:3] -= np.cross(body.omega, np.cross(body.omega, -body.r_ic))
         if k > 0:

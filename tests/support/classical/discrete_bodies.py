@@ -20,21 +20,21 @@ STEP = mpmath.mpf(10) ** -25
 Array = Any  # mpmath.matrix
 
 
-def drawn(rng: np.random.Generator, rows: int, columns: int = 1) -> Array:
+def random_matrix(rng: np.random.Generator, rows: int, columns: int = 1) -> Array:
     """Uniform numbers in -1 ... 1."""
     return mpmath.matrix(rng.uniform(-1, 1, (rows, columns)).tolist())
 
 
 def definite(rng: np.random.Generator, size: int) -> Array:
     """A symmetric positive definite matrix."""
-    half = drawn(rng, size, size)
+    half = random_matrix(rng, size, size)
     return half * half.T + mpmath.eye(size)
 
 
 def turn(rng: np.random.Generator) -> Array:
     """A rotation matrix."""
     with mpmath.workdps(DIGITS):
-        w = drawn(rng, 4)
+        w = random_matrix(rng, 4)
         w, x, y, z = w / mpmath.norm(w)
         return mpmath.matrix(
             [
@@ -82,7 +82,7 @@ class ParticleBody:
     values: dict[str, Array]
 
     @property
-    def rigid(self) -> int:
+    def rigid_count(self) -> int:
         return 3 if self.planar else 6
 
     @property
@@ -107,7 +107,7 @@ class ParticleBody:
         """Modal coordinates."""
         if not self.modes:
             return mpmath.zeros(0, 1)
-        return self.values["eta_p"] + step[self.rigid :, 0]
+        return self.values["eta_p"] + step[self.rigid_count :, 0]
 
     def inertia(self, step: Array) -> Array:
         """Rows (force, moment about the input end, modes) of everything but the ends' loads."""
@@ -210,8 +210,8 @@ class ParticleBody:
 
     def linear(self) -> tuple[Array, Array]:
         """Z and F: rows Z step + F + J_O^T f_O - J_I^T f_I = 0, loads' turning included in Z."""
-        v, size = self.values, self.rigid + self.modes
-        turns = self.rigid - self.shifts
+        v, size = self.values, self.rigid_count + self.modes
+        turns = self.rigid_count - self.shifts
         zero = mpmath.zeros(size, 1)
         m, m_in = (v.get(name, mpmath.zeros(turns, 1)) for name in ("m_p", "m_pI"))
 
@@ -222,13 +222,13 @@ class ParticleBody:
 
     def output_map(self) -> Array:
         """J_O: step -> step of (position, rotation) of the section at the output end."""
-        size, shifts = self.rigid + self.modes, self.shifts
+        size, shifts = self.rigid_count + self.modes, self.shifts
 
         def output_displacement(step: Array) -> Array:
             place = step[:shifts, 0] + self.arm(step)
-            angle = step[shifts : self.rigid, 0]
+            angle = step[shifts : self.rigid_count, 0]
             if self.modes:
-                angle = angle + self.slopes("O") * step[self.rigid :, 0]
+                angle = angle + self.slopes("O") * step[self.rigid_count :, 0]
             return stack_columns(place, angle)
 
         return differential(output_displacement, size)

@@ -23,8 +23,8 @@ from tests.support.classical.discrete_bodies import (
     Array,
     ParticleBody,
     cross,
-    drawn,
     kernel_inputs,
+    random_matrix,
     stack_columns,
 )
 from tests.support.classical.random_bodies import random_body
@@ -92,7 +92,7 @@ def random_chain(rng: np.random.Generator, planar: bool, plan: list[tuple[str, s
             modes = MODES[planar] if what == "beam" else 0
             body = random_body(rng, planar, what, modes, "yz" if not planar and modes else "")
             links.append(Link(kind, body, what == "rigid", _hinge_values(rng, planar, kind)))
-        chain = Chain(planar, links, drawn(rng, 3 if planar else 6))
+        chain = Chain(planar, links, random_matrix(rng, 3 if planar else 6))
         if not planar:
             chain.ground[3:6, 0] = mpmath.zeros(3, 1)
         return chain
@@ -101,30 +101,39 @@ def random_chain(rng: np.random.Generator, planar: bool, plan: list[tuple[str, s
 def _hinge_values(rng: np.random.Generator, planar: bool, kind: str) -> dict[str, Array]:
     shifts, turns = (2, 1) if planar else (3, 3)
     if kind == "fixed":
-        return {"gamma" if planar else "beta": drawn(rng, turns)}
+        return {"gamma" if planar else "beta": random_matrix(rng, turns)}
     if kind in ("smooth", "ball"):
-        return {"tau": drawn(rng, turns)}
+        return {"tau": random_matrix(rng, turns)}
     if kind == "pin":
-        axis = drawn(rng, 3)
+        axis = random_matrix(rng, 3)
         axis /= mpmath.norm(axis)
-        return {"a": axis, "beta": drawn(rng, 3), "tau": drawn(rng, 1), "m_n": drawn(rng, 3)}
+        return {
+            "a": axis,
+            "beta": random_matrix(rng, 3),
+            "tau": random_matrix(rng, 1),
+            "m_n": random_matrix(rng, 3),
+        }
     values = {
-        "k_t": 5 * mpmath.eye(shifts) + drawn(rng, shifts, shifts),
-        "c_t": drawn(rng, shifts, shifts), "C": 3 + drawn(rng, 1),
-        "d_s": drawn(rng, shifts), "q_s": drawn(rng, shifts),
+        "k_t": 5 * mpmath.eye(shifts) + random_matrix(rng, shifts, shifts),
+        "c_t": random_matrix(rng, shifts, shifts), "C": 3 + random_matrix(rng, 1),
+        "d_s": random_matrix(rng, shifts), "q_s": random_matrix(rng, shifts),
     }  # fmt: skip
     if planar:
         names = ("k_3", "c_r", "D_phi", "phi_0", "phi_s", "theta_s")
-        return values | {name: drawn(rng, 1) for name in names} | {"k_1": 4 + drawn(rng, 1)}
-    values |= {"k_r": 5 * mpmath.eye(3) + drawn(rng, 3, 3), "c_r": drawn(rng, 3, 3)}
-    return values | {"m_s": drawn(rng, 3)}
+        return (
+            values
+            | {name: random_matrix(rng, 1) for name in names}
+            | {"k_1": 4 + random_matrix(rng, 1)}
+        )
+    values |= {"k_r": 5 * mpmath.eye(3) + random_matrix(rng, 3, 3), "c_r": random_matrix(rng, 3, 3)}
+    return values | {"m_s": random_matrix(rng, 3)}
 
 
 # --- sections at the predictor ----------------------------------------------------------------
 
 
 def _zero(body: ParticleBody) -> Array:
-    return mpmath.zeros(body.rigid + body.modes, 1)
+    return mpmath.zeros(body.rigid_count + body.modes, 1)
 
 
 def predicted_section(chain: Chain, k: int, end: str) -> Array:
@@ -265,7 +274,7 @@ def _condense_body(body: ParticleBody, load: _Affine) -> tuple[_Affine, _Affine,
     ports = body.output_map()
     z = impedance + ports.T * load.matrix * ports
     f = rest + ports.T * load.constant
-    p, n, size = body.rigid, body.modes, body.rigid + body.modes
+    p, n, size = body.rigid_count, body.modes, body.rigid_count + body.modes
     basis = mpmath.eye(size)
     if not n:
         return _Affine(z, f), _Affine(mpmath.zeros(1, p), mpmath.zeros(1, 1)), basis
@@ -286,7 +295,7 @@ def _hinge(chain: Chain, k: int, load: _Affine) -> tuple[_Affine, _Affine]:
     gap = predicted_section(chain, k - 1, "O") - predicted_section(chain, k, "I")
     one = mpmath.eye(size)
     if link.kind in SPRINGS:
-        return _sprung(chain, k, load, gap)
+        return _spring_hinge(chain, k, load, gap)
     gap[chain.shifts :, 0] = gap[chain.shifts :, 0] + link.values.get(
         "gamma", link.values.get("beta", mpmath.zeros(size - chain.shifts, 1))
     )
@@ -316,7 +325,7 @@ def _free_directions(chain: Chain, link: Link) -> tuple[Array, Array]:
     return free, turned
 
 
-def _sprung(chain: Chain, k: int, load: _Affine, gap: Array) -> tuple[_Affine, _Affine]:
+def _spring_hinge(chain: Chain, k: int, load: _Affine, gap: Array) -> tuple[_Affine, _Affine]:
     size = chain.size
     law, lever = (
         (_planar_law(chain, k), _planar_lever) if chain.planar else (_spatial_law, _spatial_lever)
@@ -330,14 +339,14 @@ def _sprung(chain: Chain, k: int, load: _Affine, gap: Array) -> tuple[_Affine, _
         a_p, a_c = pair[:size, 0], pair[size:, 0]
         return law(values, elongation(a_p, a_c), a_p[shifts:, 0], a_c[shifts:, 0])
 
-    def across(pair: Array) -> Array:
+    def inboard_load(pair: Array) -> Array:
         a_p, a_c = pair[:size, 0], pair[size:, 0]
         return lever(values, elongation(a_p, a_c), load(a_c))
 
     whole = _affine(efforts, 2 * size)
     pivot = mpmath.inverse(load.matrix - whole.matrix[:, size:])
     carried = _Affine(pivot * whole.matrix[:, :size], pivot * (whole.constant - load.constant))
-    felt = _affine(lambda a_p: across(stack_columns(a_p, carried(a_p))), size)
+    felt = _affine(lambda a_p: inboard_load(stack_columns(a_p, carried(a_p))), size)
     return carried, felt
 
 
@@ -422,7 +431,7 @@ def _state(
     place = v["r_p"] + step[:shifts, 0]
     if end == "O" and a_o is not None:
         place = v["r_p"] + body.arm(_zero(body)) + a_o[:shifts, 0]
-    angle = step[shifts : body.rigid, 0]
+    angle = step[shifts : body.rigid_count, 0]
     if body.planar:
         angle = angle + v["theta_p"]
     parts = [place, angle, loads[shifts:, 0], loads[:shifts, 0]]

@@ -17,8 +17,8 @@ from tests.support.classical.discrete_bodies import (
     DIGITS,
     Array,
     ParticleBody,
-    drawn,
     kernel_inputs,
+    random_matrix,
     stack_columns,
 )
 from tests.support.classical.premises import Premises
@@ -48,7 +48,7 @@ def blocks(state: StateVector, values: Array, end: str) -> Values:
 
 def drawn_state(rng: np.random.Generator, state: StateVector) -> Array:
     """A state vector, 1 last."""
-    values = drawn(rng, state.length)
+    values = random_matrix(rng, state.length)
     values[state.length - 1] = 1
     return values
 
@@ -83,7 +83,7 @@ def _start(body: ParticleBody, space: Space) -> Values:
     """The states at which the premises are linearised."""
     v, turns = body.values, space.rotation_count
     none = mpmath.zeros(turns, 1)
-    still = mpmath.zeros(body.rigid + body.modes, 1)
+    still = mpmath.zeros(body.rigid_count + body.modes, 1)
     angle = v["theta_p"] if space.planar else none
     start = {
         "r_I": v["r_p"], "r_O": v["r_p"] + body.arm(still), "q_O": v["q_p"],
@@ -107,7 +107,7 @@ def hinge_residual(
 ) -> float:
     """How far z_O = U_h z_I misses the hinge's premises at a drawn z_I."""
     with mpmath.workdps(DIGITS):
-        values = {q.name: drawn(rng, q.rows, q.columns) for q in derivation.inputs}
+        values = {q.name: random_matrix(rng, q.rows, q.columns) for q in derivation.inputs}
         if "U" in values:
             closing = values["U"].rows - 1
             for j in range(closing + 1):

@@ -77,14 +77,14 @@ def matrix(e: sp.Basic, known: Values) -> mpmath.matrix:
     for kind, rule in _RULES.items():
         if isinstance(e, kind):
             parts: tuple[sp.Basic, ...] = e.args  # type: ignore[attr-defined]
-            return rule([_any(part, known) for part in parts])
+            return rule([_numeric_value(part, known) for part in parts])
     if isinstance(e, sp.BlockMatrix):
         stacked = [matrix(e.blocks[k, 0], known) for k in range(e.blocks.rows)]
         return mpmath.matrix([row for block in stacked for row in block.tolist()])
     raise NotImplementedError(f"no value of {type(e).__name__}")
 
 
-def _any(e: sp.Basic, known: Values) -> Any:
+def _numeric_value(e: sp.Basic, known: Values) -> Any:
     return matrix(e, known) if getattr(e, "is_Matrix", False) else scalar(e, known)
 
 

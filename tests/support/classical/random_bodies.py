@@ -13,7 +13,7 @@ from tests.support.classical.discrete_bodies import (
     ParticleBody,
     cross,
     definite,
-    drawn,
+    random_matrix,
     turn,
 )
 
@@ -36,7 +36,7 @@ def random_body(
 
 
 def _place(rng: np.random.Generator, planar: bool, kind: str) -> Array:
-    place = drawn(rng, 3)
+    place = random_matrix(rng, 3)
     if kind == "beam":
         return mpmath.matrix([mpmath.mpf(rng.uniform(0, 1)), 0, 0])
     if planar:
@@ -47,7 +47,7 @@ def _place(rng: np.random.Generator, planar: bool, kind: str) -> Array:
 def _shape(rng: np.random.Generator, planar: bool, kind: str, modes: int, planes: str) -> Array:
     if not modes:
         return mpmath.zeros(3, 1)
-    shape = drawn(rng, 3, modes)
+    shape = random_matrix(rng, 3, modes)
     for k in range(modes):
         along = "xyz".index(planes[k]) if planes else 1
         for i in range(3):
@@ -132,14 +132,17 @@ def _ends(rng: np.random.Generator, planar: bool, kind: str, modes: int) -> dict
     if kind == "beam" and planar:
         return {
             "L": mpmath.matrix([mpmath.mpf(rng.uniform(0.5, 1.5))]),
-            "phi_O": drawn(rng, 1, modes),
-            "Theta_O": drawn(rng, 1, modes),
-            "Theta_I": drawn(rng, 1, modes),
+            "phi_O": random_matrix(rng, 1, modes),
+            "Theta_O": random_matrix(rng, 1, modes),
+            "Theta_I": random_matrix(rng, 1, modes),
         }
-    values = {"r_e": drawn(rng, shifts)}
+    values = {"r_e": random_matrix(rng, shifts)}
     if modes:
-        values |= {"Phi_O": drawn(rng, shifts, modes), "Theta_O": drawn(rng, turns, modes)}
-        values |= {"Theta_I": drawn(rng, turns, modes)}
+        values |= {
+            "Phi_O": random_matrix(rng, shifts, modes),
+            "Theta_O": random_matrix(rng, turns, modes),
+        }
+        values |= {"Theta_I": random_matrix(rng, turns, modes)}
     return values
 
 
@@ -148,18 +151,23 @@ def _motion(rng: np.random.Generator, planar: bool, modes: int) -> dict[str, Arr
     values = {
         "A": mpmath.matrix([mpmath.mpf(rng.uniform(5, 20))]),
         "C": mpmath.matrix([mpmath.mpf(rng.uniform(2, 5))]),
-        "B_r": drawn(rng, shifts), "r_p": drawn(rng, shifts), "q_p": drawn(rng, shifts),
-        "g": drawn(rng, shifts), "f_r": drawn(rng, shifts), "f_m": drawn(rng, turns),
+        "B_r": random_matrix(rng, shifts), "r_p": random_matrix(rng, shifts),
+        "q_p": random_matrix(rng, shifts), "g": random_matrix(rng, shifts),
+        "f_r": random_matrix(rng, shifts), "f_m": random_matrix(rng, turns),
     }  # fmt: skip
     if planar:
-        values |= {name: drawn(rng, 1) for name in ("B_theta", "D_theta", "theta_p")}
+        values |= {name: random_matrix(rng, 1) for name in ("B_theta", "D_theta", "theta_p")}
     else:
-        values |= {"B_w": drawn(rng, 3), "D_w": drawn(rng, 3), "R_p": turn(rng)}
-        values["T"] = mpmath.eye(3) + drawn(rng, 3, 3) / 10
+        values |= {"B_w": random_matrix(rng, 3), "D_w": random_matrix(rng, 3), "R_p": turn(rng)}
+        values["T"] = mpmath.eye(3) + random_matrix(rng, 3, 3) / 10
     if modes:
-        values |= {name: drawn(rng, modes) for name in ("B_eta", "D_eta", "eta_p", "f_eta")}
+        values |= {name: random_matrix(rng, modes) for name in ("B_eta", "D_eta", "eta_p", "f_eta")}
         if not planar:
-            values |= {"m_p": drawn(rng, 3), "m_pI": drawn(rng, 3), "K_g": drawn(rng, modes, modes)}
+            values |= {
+                "m_p": random_matrix(rng, 3),
+                "m_pI": random_matrix(rng, 3),
+                "K_g": random_matrix(rng, modes, modes),
+            }
     return values
 
 

@@ -54,7 +54,7 @@ def net(length: int, width: int) -> MechanismGraph:
     return pins(length * width, pairs)
 
 
-def drawn(seed: int) -> MechanismGraph:
+def random_mechanism(seed: int) -> MechanismGraph:
     """A small mechanism with several loops, other rows between two to four bodies among them."""
     draw = random.Random(seed)
     count = draw.randint(3, 10)

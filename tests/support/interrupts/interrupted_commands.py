@@ -93,8 +93,8 @@ class Laboratory:
         """What lies in the folder beside the scene."""
         return {path.name for path in self.folder.iterdir()} - {"pendulum.toml"}
 
-    def whole(self) -> bytes:
-        """The result of a run that nobody interrupted; the folder is clear afterwards."""
+    def uninterrupted_result(self) -> bytes:
+        """Content of the result of an uninterrupted run; the folder is clear afterwards."""
         self.clear()
         end = self.command()
         assert end.code == 0 and self.names() == {RESULT}, end

@@ -151,7 +151,7 @@ class CLibrary:
         return code, [list(row) for row in taken]
 
 
-def same(left: Sequence[float], right: Sequence[float]) -> bool:
+def are_same_numbers(left: Sequence[float], right: Sequence[float]) -> bool:
     """Equal number for number; a NaN equals a NaN."""
     return len(left) == len(right) and all(
         a == b or (a != a and b != b) for a, b in zip(left, right, strict=True)

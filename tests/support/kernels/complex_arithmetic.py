@@ -22,7 +22,7 @@ def _angle(y: complex, x: complex) -> complex:
     return complex(real, turning / (x.real**2 + y.real**2) if turning else 0.0)
 
 
-def _flat(name: str) -> Callable[..., complex]:
+def _real_part_operation(name: str) -> Callable[..., complex]:
     """An operation that only looks at real parts."""
     operation = OPERATIONS[name].value
     return lambda *args: complex(operation(*(a.real for a in args)))
@@ -45,7 +45,9 @@ class ComplexArithmetic:
             "sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp",
             "log",
         )},
-        **{name: _flat(name) for name in ("sign", "floor", "lt", "le", "eq", "and", "or", "not")},
+        **{name: _real_part_operation(name) for name in (
+            "sign", "floor", "lt", "le", "eq", "and", "or", "not",
+        )},
         "neg": lambda a: -a,
         "add": lambda a, b: a + b,
         "sub": lambda a, b: a - b,

@@ -37,6 +37,8 @@ class ShakenArithmetic(DoubleArithmetic):
         return constant.number
 
 
-def shaken(kernel: KernelIR, inputs: Mapping[str, Any], rng: Generator) -> dict[str, list[float]]:
+def perturbed_outputs(
+    kernel: KernelIR, inputs: Mapping[str, Any], rng: Generator
+) -> dict[str, list[float]]:
     """The kernel's outputs from shaken inputs by shaken operations."""
     return replay_kernel(kernel, inputs, ShakenArithmetic(rng), None)

@@ -74,7 +74,7 @@ class ScalarKernel:
         if code:
             raise ValueError(f"guard {code}")
         return {
-            port.name: _whole(*(list(part[k])[: port.length()] for part in parts))
+            port.name: _exact_values(*(list(part[k])[: port.length()] for part in parts))
             for k, port in enumerate(self.kernel.outputs)
         }
 
@@ -89,11 +89,11 @@ class ScalarKernel:
         del kept
         if code:
             raise ValueError(f"guard {code}")
-        y = _whole(list(high), list(low))
+        y = _exact_values(list(high), list(low))
         return y[:nq], y[nq:]
 
 
-def _whole(high: Sequence[float], low: Sequence[float]) -> Exact:
+def _exact_values(high: Sequence[float], low: Sequence[float]) -> Exact:
     return [Fraction(a) + Fraction(b) for a, b in zip(high, low, strict=True)]
 
 

@@ -35,12 +35,12 @@ def of_peers(robot: Robot, *keys: str) -> Robot:
     """Without joints that mimic others, and of the laws of joints only `keys`: Pinocchio's aba
     leaves the others out."""
 
-    def bare(given: Any) -> dict[str, Any]:
+    def keep_listed_laws(given: Any) -> dict[str, Any]:
         law = {key: x for key, x in given.get("law", {}).items() if key in keys}
         rest = {key: x for key, x in given.items() if key != "law"}
         return rest | ({"law": law} if law else {})
 
-    joints = (replace(joint, keys=bare(joint.keys)) for joint in robot.joints)
+    joints = (replace(joint, keys=keep_listed_laws(joint.keys)) for joint in robot.joints)
     return replace(robot, mimics=(), joints=tuple(joints))
 
 

@@ -84,7 +84,7 @@ def tip(scene: mstmm.Scene, t_end: float, name: str = TIP, **options: Any) -> ND
     return result.quantity(name).values
 
 
-def sprung(stiffness: float, damping: float = 1e-9) -> mstmm.Scene:
+def sprung_rods(stiffness: float, damping: float = 1e-9) -> mstmm.Scene:
     """Four rods in a row: a pin with a damper, a sprung pin, a bushing and a slide."""
     rod = {"mass": 1.0, "center_of_mass": [0.5, 0, 0], "inertia": [0.001, 0.084, 0.084],
            "ends": {"tip": [1, 0, 0]}}  # fmt: skip

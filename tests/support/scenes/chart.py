@@ -34,7 +34,7 @@ def swing(t: NDArray[np.float64], amplitude: float = AMPLITUDE) -> NDArray[np.fl
     return np.asarray(2 * np.arcsin(k * sn))
 
 
-def stiff(stiffness: float = 1e8) -> mstmm.Scene:
+def stiff_rods(stiffness: float = 1e8) -> mstmm.Scene:
     """A rod on a damped bushing, and another on a pin at its tip."""
     rod = {"mass": 1.0, "center_of_mass": [0.5, 0, 0], "inertia": [0.001, 0.084, 0.084],
            "ends": {"tip": [1, 0, 0]}}  # fmt: skip

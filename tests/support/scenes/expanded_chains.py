@@ -18,11 +18,11 @@ def written_out(data: Data) -> Data:
     """
     counts = {chain["name"]: chain["count"] for chain in data["chain"]}
 
-    def plain(value: Any) -> Any:
+    def rename_nested_members(value: Any) -> Any:
         if isinstance(value, dict):
-            return {key: plain(x) for key, x in value.items()}
+            return {key: rename_nested_members(x) for key, x in value.items()}
         if isinstance(value, list):
-            return [plain(x) for x in value]
+            return [rename_nested_members(x) for x in value]
         return rename_members(value) if isinstance(value, str) else value
 
     def rename_members(text: str) -> str:
@@ -34,11 +34,11 @@ def written_out(data: Data) -> Data:
     for chain in data["chain"]:
         for k in range(chain["count"]):
             bodies.append(_body(chain, k))
-            hinges.append(plain(_hinge(chain, k)))
+            hinges.append(rename_nested_members(_hinge(chain, k)))
     found["body"] = bodies + data.get("body", [])
-    found["hinge"] = hinges + plain(data.get("hinge", []))
+    found["hinge"] = hinges + rename_nested_members(data.get("hinge", []))
     for table in ("load", "spring", "event"):
-        found[table] = plain(data.get(table, []))
+        found[table] = rename_nested_members(data.get(table, []))
     return found
 
 

@@ -86,7 +86,7 @@ def _drive(rng: Generator, scene: Scene) -> None:
             return
 
 
-def drawn(seed: int, planar: bool = False, most: int = 4) -> tuple[Scene, Array, Array]:
+def seeded_scene(seed: int, planar: bool = False, most: int = 4) -> tuple[Scene, Array, Array]:
     """Scene and a state of a seed, which is printed for a failing test."""
     print(f"engine_scenes seed = {seed}")
     scene = varied_scene(seed, planar, most)

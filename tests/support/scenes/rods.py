@@ -109,14 +109,16 @@ def precise_accelerations(scene: Scene, q: Array, u: Array) -> Array:
         if i:
             X = np.eye(6, dtype=np.longdouble)
             X[:3, 3:] = -_tilde(tip)
-            X = _both(turns[i].T) @ X
+            X = _twist_rotation(turns[i].T) @ X
             S, e = X.T @ S @ X, X.T @ (S @ _centripetal_acceleration(turns[i], omega[i]) + e)
     a = np.concatenate([-_long(scene["gravity"]), np.zeros(3, np.longdouble)])
     udot = []
     for i, (L, Y, y) in enumerate(reversed(pivots)):
         if i:
             a = np.concatenate([a[:3] + np.cross(a[3:], tip), a[3:]])
-        a = _both(turns[i].T) @ a + (_centripetal_acceleration(turns[i], omega[i]) if i else 0)
+        a = _twist_rotation(turns[i].T) @ a + (
+            _centripetal_acceleration(turns[i], omega[i]) if i else 0
+        )
         udot.append(_backward(L, y - Y @ a))
         a = a + subspace @ udot[-1] + bias[i]
     return np.concatenate(udot).astype(float)
@@ -177,7 +179,7 @@ def _tilde(a: Long) -> Long:
     return _long([[0, -z, y], [z, 0, -x], [-y, x, 0]])
 
 
-def _both(turn: Long) -> Long:
+def _twist_rotation(turn: Long) -> Long:
     out = np.zeros((6, 6), np.longdouble)
     out[:3, :3] = out[3:, 3:] = turn
     return out

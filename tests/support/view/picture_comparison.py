@@ -18,8 +18,8 @@ def blocks(picture: bytes, box: tuple[int, int, int, int], size: tuple[int, int]
     return seen.resize(size, Image.Resampling.BOX)
 
 
-def near(seen: Image.Image, reference: str) -> bool:
-    """Do they look like those of a file beside this one, which was written by looking?"""
+def matches_picture(seen: Image.Image, reference: str) -> bool:
+    """Whether the picture looks like a reference in this folder, which a person has judged."""
     known = Image.open(Path(__file__).with_name(reference)).convert("RGB")
     off = np.abs(np.asarray(seen, dtype=float) - np.asarray(known, dtype=float))
     return bool(off.mean() < MEAN and off.max() < WORST)

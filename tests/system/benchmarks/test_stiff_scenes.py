@@ -26,7 +26,7 @@ def symbols(count: int) -> tuple[list[Any], list[Any], Any]:
     return list(sp.symbols(f"q:{count}")), list(sp.symbols(f"u:{count}")), sp.Symbol("t")
 
 
-def drawn(rng: np.random.Generator, sizes: Any) -> Array:
+def random_values(rng: np.random.Generator, sizes: Any) -> Array:
     return np.asarray(rng.uniform(-1, 1, len(sizes)) * sizes)
 
 
@@ -44,7 +44,10 @@ def test_two_rods_on_bushings_follow_lagrange(rng: np.random.Generator) -> None:
     udot = accelerations(q, u, T, V, F, t)
     model = mstmm.compile(mstmm.Scene(**scenes.bushed_rods(2, k, zeta)), engine="looped")
     for _ in range(3):
-        at, rates = drawn(rng, [0.01, 0.01, 1, 0.01, 0.01, 1]), drawn(rng, [1, 1, 3, 1, 1, 3])
+        at, rates = (
+            random_values(rng, [0.01, 0.01, 1, 0.01, 0.01, 1]),
+            random_values(rng, [1, 1, 3, 1, 1, 3]),
+        )
         expected = udot(0.0, at, rates)
         scale = np.abs(expected).max()
         assert model.accelerations(at, rates) == pytest.approx(expected, abs=1e-11 * scale)
@@ -79,8 +82,8 @@ def test_half_car_follows_lagrange(rng: np.random.Generator) -> None:
     udot = accelerations(q, u, T, V, F, t)
     model = mstmm.compile(mstmm.Scene(**scenes.half_car(k, zeta)), engine="looped")
     for time in (0.0, 0.3):
-        at = drawn(rng, [0.05, 0.1, 1e-3, 1e-3, 0.3, 1e-3, 1e-3, 0.3])
-        rates = drawn(rng, [1, 1, 0.1, 0.1, 3, 0.1, 0.1, 3])
+        at = random_values(rng, [0.05, 0.1, 1e-3, 1e-3, 0.3, 1e-3, 1e-3, 0.3])
+        rates = random_values(rng, [1, 1, 0.1, 0.1, 3, 0.1, 0.1, 3])
         expected = udot(time, at, rates)
         found = model.accelerations(np.append(0.0, at), np.append(0.0, rates), time)
         assert found[0] == 0.0

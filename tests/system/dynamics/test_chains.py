@@ -104,7 +104,7 @@ def test_a_chain_is_the_scene_written_out_to_the_last_bit(
         assert np.array_equal(model.inverse_dynamics(q, u, np.zeros(model.nu), 0.7), needed)
 
 
-def drawn(rng: np.random.Generator) -> Data:
+def random_chain_scene(rng: np.random.Generator) -> Data:
     """Chains on chains: patterns, lengths (also shorter than a period) and places by chance."""
     own = [{key: x for key, x in hinge.items() if key != "law"} for hinge in HINGES]
     chains: list[Data] = []
@@ -124,7 +124,7 @@ def drawn(rng: np.random.Generator) -> Data:
 
 @pytest.mark.parametrize("draw", range(8))
 def test_drawn_chains_are_the_scenes_written_out(draw: int, rng: np.random.Generator) -> None:
-    data = drawn(np.random.default_rng([draw, int(rng.integers(2**31))]))
+    data = random_chain_scene(np.random.default_rng([draw, int(rng.integers(2**31))]))
     model, plain = unsimplified_model(data), unsimplified_model(written_out(data))
     q, u = model.initial_state()
     assert model.coordinate_layout.q_names == [*map(member_name, plain.coordinate_layout.q_names)]

@@ -11,7 +11,7 @@ import pytest
 import mstmm
 from mstmm.runtime.packing.fused_structure import structure_of
 from mstmm.runtime.packing.system_builder import system_of
-from tests.reference.compare import drawn
+from tests.reference.compare import seeded_scene
 from tests.reference.jets import Array
 from tests.support.kernels.scalar_kernels import ScalarKernel, farthest
 from tests.support.scenes.rods import chain, drawn_state
@@ -57,7 +57,7 @@ def test_fused_engine_on_a_chain(kind: str, tmp_path: Path, rng: np.random.Gener
 @pytest.mark.parametrize("seed", range(4))
 def test_looped_engine_on_trees(seed: int, tmp_path: Path) -> None:
     """Masses over three decades, all hinges, laws, loads and springs."""
-    data, q, u = drawn(700 + seed)
+    data, q, u = seeded_scene(700 + seed)
     scene = mstmm.Scene(**data)
     exact, inputs = reference(scene, q, u, 0.3, tmp_path)
     model = mstmm.compile(scene, engine="looped")

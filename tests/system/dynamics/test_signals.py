@@ -162,7 +162,7 @@ def test_a_blow_that_lasts_a_moment_is_not_missed(engine: str) -> None:
 # --- drives, conditions ---------------------------------------------------------------------------
 
 
-def driven(interpolation: str, drive: str = "wind") -> mstmm.Scene:
+def driven_rail_scene(interpolation: str, drive: str = "wind") -> mstmm.Scene:
     rail = {"name": "rail", "type": "prismatic", "axis": [1, 0, 0], "inboard": "ground",
             "outboard": "rod1", "drive": [drive]}  # fmt: skip
     return mstmm.Scene(gravity=(0, 0, 0), body=[body()], hinge=[rail], signal=[wind(interpolation)])
@@ -170,7 +170,9 @@ def driven(interpolation: str, drive: str = "wind") -> mstmm.Scene:
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_drive_follows_a_spline_up_to_its_end(engine: str) -> None:
-    run = mstmm.compile(driven("cubic"), engine=engine).simulate(3.0, output_times=[0, 0.5, 1.7, 3])
+    run = mstmm.compile(driven_rail_scene("cubic"), engine=engine).simulate(
+        3.0, output_times=[0, 0.5, 1.7, 3]
+    )
     spline = CubicSpline(TIMES, VALUES)
     np.testing.assert_allclose(run.q[:, 0], spline(run.t), rtol=0, atol=1e-14)
     np.testing.assert_allclose(run.u[:, 0], spline(run.t, 1), rtol=0, atol=1e-13)
@@ -186,7 +188,7 @@ def test_a_drive_follows_a_spline_up_to_its_end(engine: str) -> None:
     ],
 )
 def test_a_drive_cannot_jump(interpolation: str, t_end: float, says: str) -> None:
-    model = mstmm.compile(driven(interpolation))
+    model = mstmm.compile(driven_rail_scene(interpolation))
     with pytest.raises(SceneError) as error:
         model.simulate(t_end)
     assert 'drive of hinge "rail"' in str(error.value) and says in str(error.value)

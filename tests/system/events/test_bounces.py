@@ -105,7 +105,7 @@ def kinetic(q: np.ndarray, u: np.ndarray, masses: np.ndarray) -> float:
     return float(np.sum(masses * (np.abs(middle) ** 2 + own)) / 2)
 
 
-def struck(scene: Scene, when: str, restitution: float, until: float) -> mstmm.Result:
+def bounce_run(scene: Scene, when: str, restitution: float, until: float) -> mstmm.Result:
     scene["event"] = [{"when": when, "do": "bounce", "restitution": restitution}]
     return compile_scene(scene).simulate(until, rtol=1e-10, atol=1e-12)
 
@@ -118,7 +118,7 @@ def test_a_stop_in_a_four_bar(pin: str, cut: str) -> None:
     start = compile_scene(scene)
     place = start.coordinate_layout.hinges[pin].q
     begin, end = (float(x) for x in start.simulate(0.05).q[[0, -1], place])
-    result = struck(scene, f"{pin}.q {'>' if end > begin else '<'} {end!r}", 0.4, 0.1)
+    result = bounce_run(scene, f"{pin}.q {'>' if end > begin else '<'} {end!r}", 0.4, 0.1)
     hit = int(np.flatnonzero(result.trajectory.event > 0)[0])
     before, behind = result.u[hit - 1], result.u[hit]
     assert np.abs(behind + 0.4 * before).max() < 1e-12 * np.abs(before).max()
@@ -132,7 +132,7 @@ def test_carnot_in_a_loop() -> None:
     free = compile_scene(scene).simulate(0.2, output_times=[0.0, 0.2])
     path = free.position("rod2.tip")[:, 1]
     wall = float(path.mean())
-    result = struck(scene, f"rod2.tip.y {'>' if path[1] > path[0] else '<'} {wall!r}", 0.3, 0.2)
+    result = bounce_run(scene, f"rod2.tip.y {'>' if path[1] > path[0] else '<'} {wall!r}", 0.3, 0.2)
     hit = int(np.flatnonzero(result.trajectory.event > 0)[0])
     q, before, behind = result.q[hit], result.u[hit - 1], result.u[hit]
     rates = result.velocity("rod2.tip")[[hit - 1, hit], 1]
@@ -224,7 +224,7 @@ def test_a_shape_alone_is_no_place() -> None:
         blade_model("blade.q[0] > 0.01").simulate(0.1)
 
 
-def begun(when: str, height: float, speed: float, **more: Any) -> mstmm.Model:
+def ball_model(when: str, height: float, speed: float, **more: Any) -> mstmm.Model:
     scene = ball(when=when)
     scene["hinge"][0]["initial"] = {"q": height, "u": speed}
     return compile_scene(scene | more)
@@ -247,34 +247,34 @@ def test_what_begins_on_a_floor_must_leave_it(
     when: str, height: float, speed: float, method: str
 ) -> None:
     with pytest.raises(mstmm.SceneError, match='event "floor": the run starts'):
-        begun(when, height, speed).simulate(0.1, method)
+        ball_model(when, height, speed).simulate(0.1, method)
 
 
 @pytest.mark.parametrize("method", ["dop853", "scipy-DOP853"])
 @pytest.mark.parametrize("sinks", [0.0, 0.5])
 def test_what_leaves_its_floor_comes_back_to_it(sinks: float, method: str) -> None:
     """3 m/s upwards from a floor that sinks: together again after 2 (3 + sinks) / g."""
-    run = begun(f"ball.y <= -{sinks}*t", 0.0, 3.0).simulate(0.8, method, rtol=1e-10)
+    run = ball_model(f"ball.y <= -{sinks}*t", 0.0, 3.0).simulate(0.8, method, rtol=1e-10)
     assert run.t[run.event > 0][-1] == pytest.approx(2 * (3.0 + sinks) / G, rel=1e-9)
     assert run.success and run.u[-1, 0] > -3.0
 
 
 def test_what_begins_with_a_blow_is_thrown_back_at_once() -> None:
-    run = begun("ball.y <= 0", 0.0, -1.0).simulate(0.15)
+    run = ball_model("ball.y <= 0", 0.0, -1.0).simulate(0.15)
     assert run.t[run.event > 0].tolist() == [0.0]
     assert run.u[-1, 0] == pytest.approx(0.8 - G * 0.15, rel=1e-9)
 
 
 def test_from_behind_a_floor_the_way_out_is_open() -> None:
     """0.1 m below it by 3 m/s upwards: thrown back when the ball comes down to it."""
-    run = begun("ball.y <= 0", -0.1, 3.0).simulate(0.7, rtol=1e-10)
+    run = ball_model("ball.y <= 0", -0.1, 3.0).simulate(0.7, rtol=1e-10)
     hits = run.t[run.event > 0]
     assert hits.tolist() == pytest.approx([(3.0 + np.sqrt(9.0 - 0.2 * G)) / G], rel=1e-9)
 
 
 def test_what_an_acceleration_takes_away_may_begin_at_rest_on_a_wall() -> None:
     """A ceiling, and a rod whose tip is as near to a wall as it comes: both fall away from it."""
-    assert begun("ball.y >= 1", 1.0, 0.0).simulate(0.4).q[-1, 0] == pytest.approx(1 - G * 0.08)
+    assert ball_model("ball.y >= 1", 1.0, 0.0).simulate(0.4).q[-1, 0] == pytest.approx(1 - G * 0.08)
     hinge = {"name": "pin", "type": "pin", "inboard": "ground", "outboard": "rod"}
     wall = {"name": "wall", "when": "rod.tip.x >= 1", "do": "bounce", "restitution": 0.5}
     one = compile_scene({"gravity": [0, -G, 0], "body": [rod("rod", 1.0, 1.0)], "hinge": [hinge],

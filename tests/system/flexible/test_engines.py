@@ -18,7 +18,7 @@ from mstmm.runtime.packing.fused_structure import structure_of
 from tests.reference.compare import worst
 from tests.reference.jets import Array
 from tests.support.kernels.complex_arithmetic import complex_step
-from tests.support.kernels.perturbed_arithmetic import STEP, shaken
+from tests.support.kernels.perturbed_arithmetic import STEP, perturbed_outputs
 from tests.support.scenes import random_flexible as engine_scenes
 
 AGREEMENT = 1e-13
@@ -43,7 +43,9 @@ class Interpreted:
         }  # fmt: skip
         self.udot = np.array(evaluate_floats(self.kernel, self.inputs)["udot"])
         rng = np.random.default_rng(1)
-        moved = [np.array(shaken(self.kernel, self.inputs, rng)["udot"]) for _ in range(6)]
+        moved = [
+            np.array(perturbed_outputs(self.kernel, self.inputs, rng)["udot"]) for _ in range(6)
+        ]
         sensitive = max(worst(udot, self.udot) for udot in moved) * UNIT / STEP
         matrix = model.mass_matrix(q)
         size = np.sqrt(np.diag(matrix))
@@ -60,7 +62,7 @@ def model_on_engine(scene: dict[str, Any], engine: str) -> mstmm.Model:
 
 def small(seed: int, planar: bool = True, most: int = 2) -> tuple[dict[str, Any], Array, Array]:
     """A scene of `engine_scenes` that compiles in seconds: no points of quadrature."""
-    scene, q, u = engine_scenes.drawn(seed, planar, most)
+    scene, q, u = engine_scenes.seeded_scene(seed, planar, most)
     for beam in scene["beam"]:
         beam["quadrature"] = False
     return scene, q, u
@@ -71,7 +73,7 @@ def small(seed: int, planar: bool = True, most: int = 2) -> tuple[dict[str, Any]
 def test_interpreted_equals_looped(draw: int, rng: Generator) -> None:
     """Trees with everything there is: hinges of all types, drives, laws, loads on sections and
     along beams, springs, drag, points of quadrature, ends that are turned."""
-    scene, q, u = engine_scenes.drawn(int(rng.integers(2**32)), draw % 2 == 0, 3)
+    scene, q, u = engine_scenes.seeded_scene(int(rng.integers(2**32)), draw % 2 == 0, 3)
     model = model_on_engine(scene, "looped")
     fused = Interpreted(model, q, u)
     assert worst(fused.udot, model.accelerations(q, u, TIME)) < fused.allowed
@@ -107,7 +109,7 @@ def test_runs_agree(seed: int) -> None:
 def test_mass_matrix_and_inverse(draw: int, rng: Generator) -> None:
     """Symmetric, definite, the inverse of d(udot)/d(efforts); the inverse dynamics give back the
     efforts that were put in."""
-    scene, q, u = engine_scenes.drawn(int(rng.integers(2**32)), draw % 2 == 0, 3)
+    scene, q, u = engine_scenes.seeded_scene(int(rng.integers(2**32)), draw % 2 == 0, 3)
     for hinge in scene["hinge"]:
         hinge.pop("drive", None)
     model = model_on_engine(scene, "looped")

@@ -172,7 +172,7 @@ def test_both_engines_spin_up_alike() -> None:
 
 def test_spin_up_by_the_reference_at_low_cost() -> None:
     """The recorded values are those of a run now."""
-    chain = spectral([Beam(10.0, 1.4e4, 1.2)], 4, clamped=True).driven(turning(6.0))
+    chain = spectral([Beam(10.0, 1.4e4, 1.2)], 4, clamped=True).with_driven_base(turning(6.0))
     times = np.linspace(0.0, 6.8, 35)
     a, _ = chain.run(times, 1e-7)
     tip = np.array([chain.position(t, row) for t, row in zip(times, a, strict=True)])
@@ -205,8 +205,8 @@ THROWN = {
 }
 
 
-def thrown(data: Scene) -> tuple[Any, list[float]]:
-    """The result and V_RB, w_RB, mass centre at release."""
+def javelin_throw(data: Scene) -> tuple[Any, list[float]]:
+    """Result of the throw, and V_RB, w_RB and mass centre at release."""
     result = looped_model(data).simulate(
         2.0, output_times=np.linspace(0.0, 2.0, 21), rtol=1e-9, atol=1e-11
     )
@@ -221,7 +221,7 @@ def thrown(data: Scene) -> tuple[Any, list[float]]:
 
 @pytest.mark.parametrize("model", THROWN, ids=lambda m: f"{m[0]} {m[2]}")
 def test_javelin(model: tuple[str, str, int]) -> None:
-    result, released = thrown(javelin(*model, stiffening=False))
+    result, released = javelin_throw(javelin(*model, stiffening=False))
     assert np.abs(np.array(released) - THROWN[model]).max() < 1e-5
     fallen = np.array([0.0, -9.81, 0.0]) * (result.t[10:, None] - 1.0)
     velocity, spin = (
@@ -239,16 +239,16 @@ def test_javelin(model: tuple[str, str, int]) -> None:
 
 def test_javelin_is_the_same_in_every_frame_on_the_basis_of_its_mid_section() -> None:
     """Shapes that bend sharply at the hand, with stiffening: the frame does not matter."""
-    _, tangent = thrown(javelin("tangent@mid", "clamped-free", 2))
+    _, tangent = javelin_throw(javelin("tangent@mid", "clamped-free", 2))
     for frame in ("mean", "chord"):
-        _, other = thrown(javelin(frame, "clamped-free", 2))
+        _, other = javelin_throw(javelin(frame, "clamped-free", 2))
         assert np.abs(np.array(other) - tangent).max() < 4e-5
 
 
 def test_stiffened_javelin_is_that_of_exact_beams() -> None:
     """Two geometrically exact halves; the linear rows of the published throw are 2e-3 m/s off."""
     exact = list(CONVERGED["javelin"].values())
-    _, found = thrown(javelin("tangent@mid", "clamped-free", 4))
+    _, found = javelin_throw(javelin("tangent@mid", "clamped-free", 4))
     assert np.abs(np.array(found) - exact).max() < 1.5e-5
     linear = THROWN["tangent", "clamped-free", 4]
     assert np.abs(np.array(linear) - exact)[:2].min() > 2e-3

@@ -22,7 +22,7 @@ from tests.support.scenes.results import rod
 Scene = dict[str, Any]
 
 
-def everything() -> Scene:
+def mixed_laws_scene() -> Scene:
     """A ball and a bushing with laws, a driven pin, and a spring that laws alone do not see."""
     spread = [0.01, 0.02, 0.03]
     hinges = [
@@ -45,7 +45,7 @@ def everything() -> Scene:
 
 ORDERS: dict[str, Scene] = {
     "planar": motions.double_pendulum(), "spatial": motions.spatial_rods(),
-    "everything": everything(),
+    "everything": mixed_laws_scene(),
 }  # fmt: skip
 
 
@@ -78,7 +78,7 @@ def run_with_statistics(
 
 @pytest.mark.parametrize("method", ITERATED_METHODS)
 def test_iterations_agree_whatever_tangent_they_take(method: str) -> None:
-    model = looped_model(everything())
+    model = looped_model(mixed_laws_scene())
     how: dict[str, Any] = {"rtol": 1e-7, "atol": 1e-9}
     if not get(method).adaptive:
         how = {"step": 2e-3, "rtol": 1e-9, "atol": 1e-11}  # which bounds what iterations leave
@@ -177,7 +177,7 @@ def test_a_run_continues_bit_for_bit_from_every_step(
 
 def test_code_of_the_scene_keeps_the_exact_tangent_unless_asked() -> None:
     """There the exact one is a few lines; by laws alone both engines make the same run."""
-    looped, fused = (compile_scene(everything(), engine) for engine in ("looped", "fused"))
+    looped, fused = (compile_scene(mixed_laws_scene(), engine) for engine in ("looped", "fused"))
     how: dict[str, Any] = {"rtol": 1e-6, "atol": 1e-8}
     assert run_with_statistics(fused, "esdirk436", **how)[1].approximate_tangents == 0
     for method in ("rodas4pw", "esdirk436"):
@@ -200,7 +200,7 @@ def test_methods_that_need_the_exact_one_say_so() -> None:
 
 
 def test_a_result_keeps_which_tangent_was_taken(tmp_path: Any) -> None:
-    model = looped_model(everything())
+    model = looped_model(mixed_laws_scene())
     result = model.simulate(
         0.1, mstmm.methods.Implicit("rodas4pw", tangent="laws"), rtol=1e-4, atol=1e-7
     )
@@ -211,7 +211,7 @@ def test_a_result_keeps_which_tangent_was_taken(tmp_path: Any) -> None:
 
 
 def test_a_batch_takes_it_too() -> None:
-    model = looped_model(everything())
+    model = looped_model(mixed_laws_scene())
     q, u = model.initial_state()
     by_laws, by_all = (
         mstmm.methods.Implicit("rodas4pw", tangent=tangent) for tangent in ("laws", "exact")

@@ -70,7 +70,7 @@ def test_a_drive_brings_no_doubt_of_the_energy(
     assert not any("energy" in doubt for doubt in run.certificate.objections)
 
 
-def free() -> Model:
+def undriven_rods() -> Model:
     """The same rods with nothing driven."""
     data = swing().scene.model_dump(by_alias=True, exclude_unset=True)
     data["hinge"][0].pop("drive")
@@ -80,7 +80,7 @@ def free() -> Model:
 @pytest.mark.parametrize("method", FAMILY)
 def test_a_motion_that_loses_energy_is_told(method: str) -> None:
     """Steps that are far too long, of a driven motion and of a free one."""
-    for model, step in (swing((("damping", 0.03),)), 0.5), (free(), 0.1):
+    for model, step in (swing((("damping", 0.03),)), 0.5), (undriven_rods(), 0.1):
         run = model.simulate(3.0, method, step)
         assert any("energy is not conserved" in doubt for doubt in run.certificate.objections)
 

@@ -32,7 +32,7 @@ def remembering() -> mstmm.Scene:
     return mstmm.Scene(gravity=(0, -9.81, 0), body=bodies, hinge=hinges)
 
 
-def stiff() -> mstmm.Scene:
+def stiff_rods() -> mstmm.Scene:
     """Two rods on damped springs of 1e6 N m/rad, pushed by a force that varies with time."""
     law = {"stiffness": 1e6, "damping": 1e3}
     hinges = [
@@ -63,7 +63,7 @@ def test_implicit_runs_agree_with_an_explicit_one(method: str) -> None:
 
 @pytest.mark.parametrize("method", [m for m in IMPLICIT if get(m).adaptive and m != "exprb32"])
 def test_stiff_springs_do_not_set_the_step(method: str) -> None:
-    model = mstmm.compile(stiff(), engine="looped")
+    model = mstmm.compile(stiff_rods(), engine="looped")
     # at rest the springs carry the load: their turns are some load / 1e6
     exact = model.simulate(1.0, "rodas5p", rtol=1e-9, atol=1e-14, output_times=[0.5, 1.0])
     found = model.simulate(1.0, method, rtol=1e-4, atol=1e-7, output_times=[0.5, 1.0])
@@ -108,7 +108,7 @@ def test_a_scene_continues_bit_for_bit_from_every_step(method: str, how: dict[st
 
 
 def test_a_batch_makes_the_runs_of_its_trajectories() -> None:
-    model = mstmm.compile(stiff(), engine="looped")
+    model = mstmm.compile(stiff_rods(), engine="looped")
     q, u = np.zeros((3, model.nq)), np.zeros((3, model.nu))
     q[:, 0] = (0.0, 1e-4, 2e-4)
     batch = model.simulate_batch((q, u), t_end=0.3, method="rodas4p2", rtol=1e-5, atol=1e-8)
@@ -122,7 +122,7 @@ def test_a_batch_makes_the_runs_of_its_trajectories() -> None:
 
 
 def test_a_result_keeps_what_was_counted(tmp_path: Any) -> None:
-    model = mstmm.compile(stiff(), engine="looped")
+    model = mstmm.compile(stiff_rods(), engine="looped")
     result = model.simulate(
         0.3, mstmm.methods.GeneralizedAlpha("genalpha", radius=0.4), rtol=1e-4, atol=1e-7
     )
@@ -136,7 +136,7 @@ def test_a_result_keeps_what_was_counted(tmp_path: Any) -> None:
 
 
 def test_a_radius_is_asked_of_methods_that_take_one() -> None:
-    model = mstmm.compile(stiff(), engine="looped")
+    model = mstmm.compile(stiff_rods(), engine="looped")
     for method in ("dop853", "rodas4p2", "scipy-Radau"):
         with pytest.raises(
             SceneError, match="has no such parameter; methods with a radius are genalpha, dttmm"

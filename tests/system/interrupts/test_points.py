@@ -21,7 +21,11 @@ def time_of(laboratory: Laboratory) -> float:
 
 @pytest.mark.parametrize("begun", [False, True], ids=["from the start", "from a checkpoint"])
 def test_killed_at_every_step_of_its_files(laboratory: Laboratory, begun: bool) -> None:
-    whole, old, more = laboratory.whole(), laboratory.half_way(), ["--resume"] if begun else []
+    whole, old, more = (
+        laboratory.uninterrupted_result(),
+        laboratory.half_way(),
+        ["--resume"] if begun else [],
+    )
     at, existed, reached = 0, begun, 0.0
     while True:
         at += 1
@@ -45,7 +49,7 @@ def test_killed_at_every_step_of_its_files(laboratory: Laboratory, begun: bool) 
 
 @pytest.mark.parametrize("which", [signal.SIGINT, signal.SIGTERM], ids=["SIGINT", "SIGTERM"])
 def test_interrupted_at_any_line(laboratory: Laboratory, which: signal.Signals) -> None:
-    whole = laboratory.whole()
+    whole = laboratory.uninterrupted_result()
     at, said, existed = 1, set(), False
     while True:
         laboratory.clear()
@@ -68,7 +72,7 @@ def test_interrupted_at_any_line(laboratory: Laboratory, which: signal.Signals) 
 
 def test_interrupted_again_and_again(laboratory: Laboratory) -> None:
     """The first interrupt ends the run, the next one the saving, none the checkpoint."""
-    whole = laboratory.whole()
+    whole = laboratory.uninterrupted_result()
     lines = laboratory.command(points="lines").points
     for at in range(lines // 5, lines // 3, 11):
         laboratory.clear()
@@ -87,7 +91,7 @@ def test_a_checkpoint_of_another_run_is_refused(laboratory: Laboratory) -> None:
 
 
 def test_an_ignored_signal_stays_ignored(laboratory: Laboratory) -> None:
-    whole = laboratory.whole()
+    whole = laboratory.uninterrupted_result()
     for which in (signal.SIGINT, signal.SIGTERM):
         end = laboratory.command(which=which, at=1, every=7, points="lines", ignored=(which,))
         assert end.code == 0 and (laboratory.folder / RESULT).read_bytes() == whole

@@ -17,8 +17,8 @@ from tests.support.scenes.constraints import GRAVITY, MASS, RADIUS, Scene, bead,
 WIDTH = 0.7
 
 
-def hung(law: dict[str, Any], scene: Scene) -> mstmm.Model:
-    """The scene with a law on its only hinge."""
+def model_with_law(law: dict[str, Any], scene: Scene) -> mstmm.Model:
+    """Model of the scene with a law on its only hinge."""
     scene["hinge"][0]["law"] = law
     return compile_scene(scene)
 
@@ -28,7 +28,7 @@ def on_a_parabola() -> mstmm.Model:
     scene = bead(("s", f"s^2/(2*{WIDTH})"), 0.3, (0.3, 0.3**2 / 2 / WIDTH))
     scene["hinge"][0] |= {"type": "planar", "orientation": [math.pi / 2, 0, 0],
                           "initial": {"q": [0.3, 0.3**2 / 2 / WIDTH, 0]}}  # fmt: skip
-    return hung({"stiffness": [0, 0, 3.0]}, scene)
+    return model_with_law({"stiffness": [0, 0, 3.0]}, scene)
 
 
 def test_a_bead_on_a_parabola() -> None:
@@ -48,7 +48,7 @@ def test_a_bead_on_a_helix() -> None:
     """On a spring upwards it hangs m g / k deep; along the wire k c^2 / (r^2 + c^2) holds it."""
     scene = bead(("0.5*cos(s)", "0.2*s"), 0.0, (0.5, 0.0))
     scene["constraint"][0]["curve"][1] = "0.5*sin(s)"
-    model = hung({"stiffness": [0, 0, 50.0, 3.0, 3.0, 3.0]}, scene)
+    model = model_with_law({"stiffness": [0, 0, 50.0, 3.0, 3.0, 3.0]}, scene)
     rest = model.equilibrium()
     depth = 0.3 * GRAVITY / 50.0
     assert abs(rest[2] + depth) < 1e-12 and abs(rest[7] + depth / 0.2) < 1e-11
@@ -84,7 +84,7 @@ def test_a_ball_that_rolls_on_a_spring() -> None:
     free = {"name": "at", "type": "free", "inboard": "ground", "outboard": "ball",
             "initial": {"q": [0, 0, 0.2, 1, 0, 0, 0]}}  # fmt: skip
     spring = {"stiffness": [40.0, 10.0, 0.0, 0.0, 0.0, 0.0], "damping": [0.3, 0, 0, 0, 0, 0]}
-    model = hung(spring, {
+    model = model_with_law(spring, {
         "gravity": [0, 0, -GRAVITY], "hinge": [free],
         "body": [{"name": "ball", "mass": 0.5, "inertia": [0.004, 0.004, 0.004]}],
         "constraint": [{"name": "table", "type": "rolling", "from": "ground", "to": "ball",

@@ -62,7 +62,7 @@ def shackled_beam() -> Scene:
                       "ends": {"mid": 0.6}}]}  # fmt: skip
 
 
-def hung() -> Scene:
+def hanging_bar() -> Scene:
     """Two beams in space from the ground to the ends of a bar, on balls; they bend both ways."""
     beams = [
         {"name": name, "length": 1.0, "mass_per_length": 0.8, "bending_stiffness": [30.0, 50.0],
@@ -98,7 +98,8 @@ def meshed_slider_crank() -> Scene:
 
 
 SCENES = {"meshed": (meshed_slider_crank, "slider", 3), "slider_crank": (slider_crank, "slider", 2),
-          "shackled": (shackled_beam, "far.tip", 2), "hung": (hung, "bar.tip", 3)}  # fmt: skip
+          "shackled": (shackled_beam, "far.tip", 2),
+          "hung": (hanging_bar, "bar.tip", 3)}  # fmt: skip
 
 
 def run(scene: Scene, t_end: float = 0.3, **options: Any) -> mstmm.Result:

@@ -38,14 +38,14 @@ def blade_model(ring: float = 0.7, **closing: Any) -> mstmm.Model:
 
 
 @cache
-def free() -> mstmm.Model:
+def free_blade_model() -> mstmm.Model:
     return blade_model()
 
 
 def end_position(end: str, q: Array) -> Array:
     """Place of an end of the free blade, m."""
-    still = np.zeros(free().nu)
-    run = free().simulate(1e-9, initial=(q, still), output_times=[0.0])
+    still = np.zeros(free_blade_model().nu)
+    run = free_blade_model().simulate(1e-9, initial=(q, still), output_times=[0.0])
     return np.asarray(run.position(end)[0])
 
 
@@ -86,11 +86,15 @@ def test_what_closes_acts_along_its_row(name: str) -> None:
     closing, ring, row = ROWS[name]
     one = blade_model(ring, **closing)
     q, u = one.initial_state()
-    places = [one.coordinate_layout.q_names.index(x) for x in free().coordinate_layout.q_names]
-    speeds = [one.coordinate_layout.u_names.index(x) for x in free().coordinate_layout.u_names]
+    places = [
+        one.coordinate_layout.q_names.index(x) for x in free_blade_model().coordinate_layout.q_names
+    ]
+    speeds = [
+        one.coordinate_layout.u_names.index(x) for x in free_blade_model().coordinate_layout.u_names
+    ]
     q_free, u_free = q[places], u[speeds]
-    added = one.accelerations(q, u)[speeds] - free().accelerations(q_free, u_free)
-    efforts = free().mass_matrix(q_free) @ added
+    added = one.accelerations(q, u)[speeds] - free_blade_model().accelerations(q_free, u_free)
+    efforts = free_blade_model().mass_matrix(q_free) @ added
     sides = [[row(q_free + side * e) for e in np.eye(len(q_free))] for side in (1e-5, -1e-5)]
     slopes = (np.array(sides[0]) - sides[1]) / 2e-5
     assert abs(slopes @ u_free) < 1e-8

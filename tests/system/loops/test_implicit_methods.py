@@ -108,21 +108,21 @@ def test_loops_in_space() -> None:
 
 
 @pytest.fixture(scope="module", params=[bushed_four_bar, slider], ids=["bushed", "slider"])
-def stiff(request: pytest.FixtureRequest) -> mstmm.Model:
+def stiff_model(request: pytest.FixtureRequest) -> mstmm.Model:
     return mstmm.compile(mstmm.Scene(**request.param(1e6)))
 
 
 @pytest.mark.parametrize(
     ("method", "much"), [("rodas4p2", 1e-7), ("kvaerno5", 1e-6), ("genalpha", 1e-3)]
 )
-def test_stiff_mechanisms(method: str, much: float, stiff: mstmm.Model) -> None:
+def test_stiff_mechanisms(method: str, much: float, stiff_model: mstmm.Model) -> None:
     """By its own steps, against many explicit ones; loops are closed where steps end."""
     times = np.linspace(0.0, 0.3, 7)
-    wanted = stiff.simulate(0.3, "dop853", rtol=1e-10, atol=1e-12, output_times=times)
-    result = stiff.simulate(0.3, method, rtol=1e-6, output_times=times)
+    wanted = stiff_model.simulate(0.3, "dop853", rtol=1e-10, atol=1e-12, output_times=times)
+    result = stiff_model.simulate(0.3, method, rtol=1e-6, output_times=times)
     assert result.success, result.message
     assert np.abs(result.q[-1] - wanted.q[-1]).max() < much
-    calls = LoopCalls(stiff.looped, result.q[-1])
+    calls = LoopCalls(stiff_model.looped, result.q[-1])
     for level in (calls.position_level, calls.velocity_level):
         missing = calls.correction(level, result.q[-1], result.u[-1], t=0.3)[1]
         assert np.abs(missing).max() < 1e-10

@@ -85,15 +85,16 @@ def _planar_rows(
     length: int,
     motion: dict[str, list[sp.Expr]],
 ) -> sp.Matrix:
-    def over(f: sp.Expr) -> sp.Expr:
+    def mass_integral(f: sp.Expr) -> sp.Expr:
         return density * sp.integrate(sp.expand(f), (x, 0, length))
 
     letters = SymbolTable()
     body = planar_moments(2, letters, "beam")
     given = {
-        "m": [over(sp.Integer(1))], "S_0": [over(x), 0], "I_0": [over(x**2)],
-        "s": [over(f) for f in shapes], "S_c": [over(x * f) for f in shapes],
-        "M_f": [over(f * g) for f in shapes for g in shapes], ETA: motion[ETA],
+        "m": [mass_integral(sp.Integer(1))],
+        "S_0": [mass_integral(x), 0], "I_0": [mass_integral(x**2)],
+        "s": [mass_integral(f) for f in shapes], "S_c": [mass_integral(x * f) for f in shapes],
+        "M_f": [mass_integral(f * g) for f in shapes for g in shapes], ETA: motion[ETA],
     }  # fmt: skip
     solved = equations_of_motion(body.moments, motion_of(letters, 2, 2), sp.zeros(2, 1))
     return numeric(solved.rows, letters, body.definitions, given | motion)

@@ -16,7 +16,7 @@ from mstmm.errors import SceneError
 from mstmm.pipeline.report import summary_tables
 from tests.support.scenes import view as scenes
 from tests.support.view import browser
-from tests.support.view.picture_comparison import blocks, near
+from tests.support.view.picture_comparison import blocks, matches_picture
 
 #: Nothing may be fetched: the page names no other place but in what readers may follow themselves.
 _FETCHED = ("<link", '<img src="http', "<script src", "@import")
@@ -72,7 +72,9 @@ def test_the_strip_looks_as_it_did(page: Path) -> None:
         assert seen.wait("document.querySelector('img') && document.querySelector('img').complete")
         seen.value("document.querySelector('img').scrollIntoView({block: 'center'})")
         assert seen.wait_for_picture(
-            lambda picture: near(blocks(picture, seen.value(STRIP), (18, 4)), "strip.png")
+            lambda picture: matches_picture(
+                blocks(picture, seen.value(STRIP), (18, 4)), "strip.png"
+            )
         )
 
 

@@ -11,7 +11,7 @@ import pytest
 import mstmm
 from mstmm.numerics.rotations import from_rpy, to_rpy
 from mstmm.scene import HingeRating
-from tests.mstmm.scene.robots.test_urdf_reader import ARM, written
+from tests.mstmm.scene.robots.test_urdf_reader import ARM, write_robot_file
 
 HINGES: tuple[dict[str, Any], ...] = (
     {"name": "mast", "type": "pin", "inboard": "ground", "position": [0.1, 0.2, 0.3],
@@ -75,7 +75,7 @@ def test_a_scene_comes_back_and_moves_alike(tmp_path: Path, rng: np.random.Gener
 
 
 def test_a_robots_file_comes_back_as_the_same_scene(tmp_path: Path) -> None:
-    first = mstmm.import_robot(written(tmp_path, ARM), stops=1e4)
+    first = mstmm.import_robot(write_robot_file(tmp_path, ARM), stops=1e4)
     exported = mstmm.export_robot(first.scene)
     (tmp_path / "again.urdf").write_text(exported.text)
     again = mstmm.import_robot(tmp_path / "again.urdf", stops=1e4)
@@ -189,20 +189,20 @@ def test_three_angles_give_the_rotation_again(rng: np.random.Generator) -> None:
 
 @pytest.mark.parametrize("stops", [None, 1e4])
 def test_what_joints_are_rated_for_comes_back(tmp_path: Path, stops: float | None) -> None:
-    first = mstmm.import_robot(written(tmp_path, ARM), stops=stops)
+    first = mstmm.import_robot(write_robot_file(tmp_path, ARM), stops=stops)
     shoulder, jaw, other = first.scene.hinge
     assert shoulder.rated == HingeRating(lower=-1.0, upper=2.0, effort=30.0, velocity=5.0)
     assert jaw.rated == HingeRating(lower=0.0, upper=0.04) and other.rated is None
     text = mstmm.export_robot(first.scene).text
     assert '<limit lower="-1.0" upper="2.0" effort="30.0" velocity="5.0" />' in text
-    again = mstmm.load_scene(written(tmp_path, text, "again.urdf"))
+    again = mstmm.load_scene(write_robot_file(tmp_path, text, "again.urdf"))
     assert [hinge.rated for hinge in again.hinge[:2]] == [shoulder.rated, jaw.rated]
-    assert mstmm.load_scene(written(tmp_path, first.to_toml(), "arm.toml")) == first.scene
+    assert mstmm.load_scene(write_robot_file(tmp_path, first.to_toml(), "arm.toml")) == first.scene
 
 
 def test_a_wheel_is_rated_without_a_range(tmp_path: Path) -> None:
     wheel = ARM.replace('"revolute"', '"continuous"').replace('"30"', '"-1"')
-    found = mstmm.import_robot(written(tmp_path, wheel))
+    found = mstmm.import_robot(write_robot_file(tmp_path, wheel))
     assert found.scene.hinge[0].rated == HingeRating(velocity=5.0)
     assert "limits of effort or velocity below 0 left out" in [note.text for note in found.notes]
     text = mstmm.export_robot(found.scene).text
@@ -211,7 +211,7 @@ def test_a_wheel_is_rated_without_a_range(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("value", ["inf", "nan", "", "many"])
 def test_ratings_that_are_no_numbers_are_left_out(tmp_path: Path, value: str) -> None:
-    found = mstmm.import_robot(written(tmp_path, ARM.replace('"30"', f'"{value}"')))
+    found = mstmm.import_robot(write_robot_file(tmp_path, ARM.replace('"30"', f'"{value}"')))
     assert found.scene.hinge[0].rated == HingeRating(lower=-1.0, upper=2.0, velocity=5.0)
     told = f"limits that are not finite numbers left out: effort '{value}'"
     assert told in [note.text for note in found.notes]

@@ -11,7 +11,7 @@ import pytest
 import mstmm
 from mstmm.scene.robots.robot_model import Joint, Link, Mimic, Robot
 from mstmm.scene.robots.scene_from_robot import ImportOptions, scene_from_robot
-from tests.mstmm.scene.robots.test_urdf_reader import ARM, written
+from tests.mstmm.scene.robots.test_urdf_reader import ARM, write_robot_file
 
 _UNIT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -33,7 +33,7 @@ def pin(number: int, start: float | None = None, kind: str = "pin") -> Joint:
 
 
 def test_a_joint_that_mimics_may_be_held(tmp_path: Path) -> None:
-    path = written(tmp_path, ARM)
+    path = write_robot_file(tmp_path, ARM)
     found = mstmm.import_robot(path, mimics="held")
     assert not found.scene.coupling
     assert "held at 0.01; it mimics another" in [note.text for note in found.notes]

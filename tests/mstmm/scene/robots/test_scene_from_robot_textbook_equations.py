@@ -9,7 +9,7 @@ import pytest
 
 import mstmm
 from mstmm.array_validation import Array
-from tests.mstmm.scene.robots.test_urdf_reader import written
+from tests.mstmm.scene.robots.test_urdf_reader import write_robot_file
 
 #: A cart on a rail along x, and on it a pole about y that hangs down at 0.
 CART = """<robot name="cart"><link name="base"/>
@@ -62,6 +62,6 @@ def test_accelerations_are_those_of_textbooks(
     engine: str, text: str, wanted: object, tmp_path: Path, rng: np.random.Generator
 ) -> None:
     assert callable(wanted)
-    model = mstmm.compile(mstmm.load_scene(written(tmp_path, text)), engine=engine)
+    model = mstmm.compile(mstmm.load_scene(write_robot_file(tmp_path, text)), engine=engine)
     for q, u in rng.uniform(-2, 2, (20, 2, 2)):
         assert model.accelerations(q, u) == pytest.approx(wanted(q, u), rel=1e-12, abs=1e-12)

@@ -11,7 +11,7 @@ import mstmm
 from mstmm.scene.robots.robot_model import Joint, Link, Mimic, Robot
 from mstmm.scene.robots.scene_from_robot import ImportedRobot, ImportOptions, scene_from_robot
 from tests.mstmm.scene.robots.test_scene_from_robot import chain, pin
-from tests.mstmm.scene.robots.test_urdf_reader import ARM, joint, robot, written
+from tests.mstmm.scene.robots.test_urdf_reader import ARM, joint, robot, write_robot_file
 
 IN_M = """<robot><link name="base"/>
   <joint name="rail" type="prismatic"><parent link="base"/><child link="cart"/>
@@ -58,8 +58,8 @@ def note_texts(found: ImportedRobot) -> list[str]:
 
 
 def test_mm_and_g_move_as_m_and_kg_do(tmp_path: Path) -> None:
-    plain = mstmm.import_robot(written(tmp_path, IN_M, "a.urdf"), stops=1e4)
-    path = written(tmp_path, IN_MM, "b.urdf")
+    plain = mstmm.import_robot(write_robot_file(tmp_path, IN_M, "a.urdf"), stops=1e4)
+    path = write_robot_file(tmp_path, IN_MM, "b.urdf")
     found = mstmm.import_robot(path, stops=1e4, units={"length": "mm", "mass": "g"})
     assert not any(note.element == "units" for note in (*plain.notes, *found.notes))
     runs = [mstmm.compile(each.scene).simulate(0.3, rtol=1e-10) for each in (plain, found)]
@@ -75,7 +75,7 @@ def test_mm_and_g_move_as_m_and_kg_do(tmp_path: Path) -> None:
 
 
 def test_units_that_are_none(tmp_path: Path) -> None:
-    path = written(tmp_path, ARM)
+    path = write_robot_file(tmp_path, ARM)
     with pytest.raises(mstmm.SceneError, match="units: length: expected one of m, cm, mm, in"):
         mstmm.import_robot(path, units={"length": "furlong"})
     with pytest.raises(mstmm.SceneError, match=r'units: expected ."length": ...'):
@@ -83,7 +83,7 @@ def test_units_that_are_none(tmp_path: Path) -> None:
 
 
 def test_loading_takes_units_too(tmp_path: Path) -> None:
-    path, units = written(tmp_path, IN_MM), {"length": "mm", "mass": "g"}
+    path, units = write_robot_file(tmp_path, IN_MM), {"length": "mm", "mass": "g"}
     assert mstmm.load_scene(path, units=units) == mstmm.import_robot(path, units=units).scene
     with pytest.raises(mstmm.SceneError, match="units: mass: expected one of kg, g, t, lb"):
         mstmm.load_scene(path, units={"mass": "stone"})
@@ -91,7 +91,7 @@ def test_loading_takes_units_too(tmp_path: Path) -> None:
 
 def test_scene_files_have_no_units(tmp_path: Path) -> None:
     path = tmp_path / "arm.toml"
-    path.write_text(mstmm.import_robot(written(tmp_path, IN_M)).to_toml())
+    path.write_text(mstmm.import_robot(write_robot_file(tmp_path, IN_M)).to_toml())
     with pytest.raises(
         mstmm.SceneError, match=r"arm\.toml: units: expected none for a scene file, .* m and kg"
     ):
@@ -112,7 +112,7 @@ def test_sizes_that_do_not_look_like_m_and_kg_are_told(
     text: str, sign: str, tmp_path: Path
 ) -> None:
     (note,) = [
-        note for note in mstmm.import_robot(written(tmp_path, text)).notes
+        note for note in mstmm.import_robot(write_robot_file(tmp_path, text)).notes
         if note.element == "units"
     ]  # fmt: skip
     assert sign in note.text and "probably not m and kg" in note.text
@@ -124,7 +124,7 @@ def test_links_with_dust_of_inertia_and_no_mass_have_none(
 ) -> None:
     speck = f'<link name="speck"><inertial><mass value="0"/><inertia ixx="{entry}"/></inertial>'
     extra = joint("continuous", "tool", "speck") + speck + "</link></robot>"
-    found = mstmm.import_robot(written(tmp_path, ARM.replace("</robot>", extra)))
+    found = mstmm.import_robot(write_robot_file(tmp_path, ARM.replace("</robot>", extra)))
     assert (
         "link 'speck': no mass, and an inertia that is rounding; both are treated as zero"
         in note_texts(found)
@@ -161,5 +161,5 @@ def test_a_mimic_of_several_coordinates_is_told(tmp_path: Path) -> None:
     body = '<link name="c"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/>'
     mimic = joint("planar", "a", "c", '<mimic joint="k"/>')
     text = robot("a", mimic).replace("</robot>", body + "</inertial></link></robot>")
-    found = mstmm.import_robot(written(tmp_path, text))
+    found = mstmm.import_robot(write_robot_file(tmp_path, text))
     assert "joint 'j': its <mimic> is left out: a planar joint" in note_texts(found)

@@ -56,7 +56,7 @@ ARM = """\
 """
 
 
-def written(folder: Path, text: str, name: str = "arm.urdf") -> Path:
+def write_robot_file(folder: Path, text: str, name: str = "arm.urdf") -> Path:
     path = folder / name
     path.write_text(text)
     return path
@@ -79,14 +79,14 @@ def test_a_pendulum_swings_as_its_formula_says(tmp_path: Path) -> None:
         '<mass value="2"/><inertia ixx="0.3" iyy="0.01" izz="0.3"/></inertial></link>'
     )
     text = f'<robot><link name="base"/>{turned}{bob}</robot>'
-    model = mstmm.compile(mstmm.load_scene(written(tmp_path, text)))
+    model = mstmm.compile(mstmm.load_scene(write_robot_file(tmp_path, text)))
     q, lean = 0.4, np.sin(1.2)  # gravity along -z, of which the axis leaves sin(1.2) across
     expected = -2 * 9.81 * 0.5 * lean * np.cos(q) / (0.3 + 2 * 0.5**2)
     assert model.accelerations([q], [0.0])[0] == pytest.approx(expected, rel=1e-14)
 
 
 def test_welded_links_move_as_bodies_of_their_own_do(tmp_path: Path) -> None:
-    path = written(tmp_path, ARM)
+    path = write_robot_file(tmp_path, ARM)
     one, many = (mstmm.import_robot(path, merge=merge) for merge in (True, False))
     assert [body.name for body in one.scene.body] == ["link_1st_arm", "finger", "other_finger"]
     assert one.names["tool"] == "link_1st_arm.tool" and one.names["base"] == "ground"
@@ -101,7 +101,7 @@ def test_welded_links_move_as_bodies_of_their_own_do(tmp_path: Path) -> None:
 
 
 def test_what_joints_say_becomes_laws_couplings_and_notes(tmp_path: Path) -> None:
-    found = mstmm.import_robot(written(tmp_path, ARM), stops=1e4)
+    found = mstmm.import_robot(write_robot_file(tmp_path, ARM), stops=1e4)
     shoulder, _, other = found.scene.hinge
     assert shoulder.name == "shoulder_1" and shoulder.axis == (0.0, 2.0, 0.0)
     assert shoulder.law.damping == (0.4,) and shoulder.law.friction[0].coulomb == 0.1
@@ -119,7 +119,7 @@ def test_what_joints_say_becomes_laws_couplings_and_notes(tmp_path: Path) -> Non
 
 
 def test_limits_are_no_stops_unless_they_get_a_stiffness(tmp_path: Path) -> None:
-    found = mstmm.import_robot(written(tmp_path, ARM))
+    found = mstmm.import_robot(write_robot_file(tmp_path, ARM))
     assert not any(entry.limits[0].acts for entry in (h.law for h in found.scene.hinge))
     assert (
         sum(note.text == "its limits are not stops; they are kept as rated" for note in found.notes)
@@ -137,7 +137,7 @@ def test_what_is_there_twice_or_unknown_is_noted(tmp_path: Path) -> None:
 <limit lower="-1" upper="1"/><limit lower="-2" upper="2"/>
 <dynamics damping="1" spring_stiffness="10" spring_reference="0.3"/>
 <joint_properties damping="0.2"/></joint></robot>"""
-    found = mstmm.import_robot(written(tmp_path, twice))
+    found = mstmm.import_robot(write_robot_file(tmp_path, twice))
     (body,), (hinge,) = found.scene.body, found.scene.hinge
     assert body.mass == 1.0 and hinge.axis == (0.0, 1.0, 0.0) and hinge.law.damping == (1.0,)
     notes = {str(note).split(": ", 1)[1] for note in found.notes}
@@ -152,12 +152,12 @@ def test_what_is_there_twice_or_unknown_is_noted(tmp_path: Path) -> None:
         "spring_stiffness, spring_reference",
         "line 4: joint 'j': <joint_properties> in <joint> left out",
     }
-    known = mstmm.import_robot(written(tmp_path, ARM))
+    known = mstmm.import_robot(write_robot_file(tmp_path, ARM))
     assert not any("left out" in one.text for one in known.notes if "<transm" not in one.element)
 
 
 def test_a_free_base_falls(tmp_path: Path) -> None:
-    found = mstmm.import_robot(written(tmp_path, ARM), base="free")
+    found = mstmm.import_robot(write_robot_file(tmp_path, ARM), base="free")
     assert found.names["base"] == "world.base" and found.scene.hinge[0].type == "free"
     result = mstmm.compile(found.scene).simulate(0.5, rtol=1e-9)
     place = result.position("world")[-1]
@@ -168,15 +168,15 @@ def test_a_free_base_falls(tmp_path: Path) -> None:
 
 
 def test_the_file_written_reads_back(tmp_path: Path) -> None:
-    found = mstmm.import_robot(written(tmp_path, ARM))
-    again = mstmm.load_scene(written(tmp_path, found.to_toml(), "arm.toml"))
+    found = mstmm.import_robot(write_robot_file(tmp_path, ARM))
+    again = mstmm.load_scene(write_robot_file(tmp_path, found.to_toml(), "arm.toml"))
     assert again == found.scene == mstmm.load_scene(tmp_path / "arm.urdf")
 
 
 def test_a_joint_that_carries_no_mass_is_held(tmp_path: Path) -> None:
     text = ARM.replace("<transmission", joint("continuous", "tool", "sensor") + "<transmission")
     text = text.replace("</robot>", '<link name="sensor"/></robot>')
-    found = mstmm.import_robot(written(tmp_path, text))
+    found = mstmm.import_robot(write_robot_file(tmp_path, text))
     assert "j" not in found.names
     held = [note for note in found.notes if note.element == "joint 'j'"]
     assert "fixed, because" in held[0].text
@@ -184,7 +184,7 @@ def test_a_joint_that_carries_no_mass_is_held(tmp_path: Path) -> None:
 
 def test_an_inertia_that_no_body_has_is_taken_and_told(tmp_path: Path) -> None:
     text = ARM.replace('ixx="0.002" iyy="0.003" izz="0.001"', 'ixx="0.2" iyy="3" izz="0.1"')
-    found = mstmm.import_robot(written(tmp_path, text), merge=False)
+    found = mstmm.import_robot(write_robot_file(tmp_path, text), merge=False)
     assert any("violate the triangle inequality" in note.text for note in found.notes)
     assert mstmm.compile(found.scene).nu == 3
 
@@ -194,7 +194,7 @@ def test_an_inertia_that_no_body_has_is_taken_and_told(tmp_path: Path) -> None:
 )
 def test_moments_below_0_by_rounding_are_0(tmp_path: Path, izz: str, taken: float) -> None:
     text = ARM.replace('iyy="0.003" izz="0.001"', f'iyy="0.002" izz="{izz}"')
-    found = mstmm.import_robot(written(tmp_path, text), merge=False)
+    found = mstmm.import_robot(write_robot_file(tmp_path, text), merge=False)
     tool = next(body for body in found.scene.body if body.name == "tool")
     assert tool.inertia[:3] == (0.002, 0.002, taken)
     told = [note.text for note in found.notes if note.element == "link 'tool'"]
@@ -234,13 +234,13 @@ def test_moments_below_0_by_rounding_are_0(tmp_path: Path, izz: str, taken: floa
 )  # fmt: skip
 def test_files_that_are_no_robots(text: str, message: str, tmp_path: Path) -> None:
     with pytest.raises(mstmm.SceneError) as raised:
-        mstmm.import_robot(written(tmp_path, text))
+        mstmm.import_robot(write_robot_file(tmp_path, text))
     assert message in str(raised.value)
     assert str(raised.value).startswith(str(tmp_path / "arm.urdf"))
 
 
 def test_choices_that_are_none(tmp_path: Path) -> None:
-    path = written(tmp_path, ARM)
+    path = write_robot_file(tmp_path, ARM)
     with pytest.raises(mstmm.SceneError, match='base: expected "fixed" or "free", found'):
         mstmm.import_robot(path, base="flying")
     with pytest.raises(mstmm.SceneError, match="stops: expected a stiffness above 0"):
@@ -264,7 +264,7 @@ def test_meshes_lie_in_packages_above_and_collision_shapes_stand_in(tmp_path: Pa
         f"<collision>{mesh.format('my%20robots/arm/hull.obj')}</collision>"
         f"<collision>{mesh.format('other/none.stl')}</collision>",
     )
-    found = mstmm.import_robot(written(folder, text))
+    found = mstmm.import_robot(write_robot_file(folder, text))
     drawn = [Path(shape.file or "").name for shape in found.scene.shape]
     assert drawn == ["plate.stl", "hull.obj"]
     told = [f"{note.element}: {note.text}" for note in found.notes]
@@ -284,7 +284,7 @@ def test_names_that_a_scene_takes_stay_and_others_are_told(tmp_path: Path) -> No
         for name, on, link in (("j-1", "base", "c-1"), ("j_1", "c-1", "c_1"))
     )
     text = f'<robot><link name="base"/>{links}{joints}</robot>'
-    found = mstmm.import_robot(written(tmp_path, text))
+    found = mstmm.import_robot(write_robot_file(tmp_path, text))
     assert found.names["c_1"] == "c_1" and found.names["j_1"] == "j_1"
     assert found.names["c-1"] == "c_1_2" and found.names["j-1"] == "j_1_2"
     assert {body.name: body.mass for body in found.scene.body} == {"c_1_2": 1.0, "c_1": 2.0}
@@ -299,7 +299,7 @@ def test_what_says_too_little_is_told(tmp_path: Path) -> None:
         '<link name="base"/><link name="bob"><inertial><mass value="2"/></inertial></link>'
         '<link name="dot"><inertial><inertia ixx="1" iyy="1" izz="1"/></inertial></link>'
     )
-    path = written(tmp_path, f"<robot>{links}{turned}{slid}</robot>")
+    path = write_robot_file(tmp_path, f"<robot>{links}{turned}{slid}</robot>")
     told = {note.element: note.text for note in mstmm.import_robot(path, stops=1e4).notes}
     assert told["link 'bob'"] == "a mass without <inertia>: a point mass"
     assert told["link 'dot'"] == "moments of inertia without a mass"
@@ -312,7 +312,7 @@ def test_links_that_are_no_bodies_and_those_without_mass_are_told_by_line(tmp_pa
     text = ARM.replace('<link name="1st arm">', '<link name="swivel"/><link name="1st arm">')
     text = text.replace('<child link="1st arm"/>', '<child link="swivel"/>', 1)
     text = text.replace("<transmission", joint("continuous", "swivel", "1st arm") + "<transmission")
-    path = written(tmp_path, text)
+    path = write_robot_file(tmp_path, text)
     told = [str(note).split(": ", 1)[1] for note in mstmm.import_robot(path).notes]
     assert "line 5: link 'base': part of the ground" in told
     found = "part of its inboard body; its name refers to its frame there"

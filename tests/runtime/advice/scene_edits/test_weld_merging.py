@@ -74,8 +74,8 @@ def test_the_same_motion(rng: np.random.Generator) -> None:
             assert np.abs(one - other).max() < 1e-9
 
 
-def same(scene: mstmm.Scene, keep: Collection[str] = ()) -> MergedScene:
-    """The scene merged, which moves as it did and reads back from a file."""
+def merge_and_compare(scene: mstmm.Scene, keep: Collection[str] = ()) -> MergedScene:
+    """Merge the welds of a scene, and assert that it moves as before, also read from text."""
     found = merge_welds(scene, keep)
     assert found is not None
     read = mstmm.Scene.from_data(tomllib.loads(found.scene.to_toml()))
@@ -106,7 +106,7 @@ def same(scene: mstmm.Scene, keep: Collection[str] = ()) -> MergedScene:
 )
 def test_what_can_be_said_of_the_whole(rng: np.random.Generator, more: dict[str, Any]) -> None:
     """Places, axes of loads and springs within a body, in expressions too."""
-    found = same(lumps(rng, **more))
+    found = merge_and_compare(lumps(rng, **more))
     assert [body.name for body in found.scene.body] == ["p", "s"]
     assert found.idle == (('spring "spring1"',) if "spring" in more else ())
 
@@ -121,14 +121,14 @@ def test_what_can_be_said_of_the_whole(rng: np.random.Generator, more: dict[str,
 def test_what_is_spoken_of_stays(
     rng: np.random.Generator, more: dict[str, Any], kept: list[str]
 ) -> None:
-    found = same(lumps(rng, **more))
+    found = merge_and_compare(lumps(rng, **more))
     assert [body.name for body in found.scene.body] == kept
 
 
 def test_the_inboard_one_becomes_part_where_the_outboard_one_stays(
     rng: np.random.Generator,
 ) -> None:
-    found = same(lumps(rng), keep=["r", "t"])
+    found = merge_and_compare(lumps(rng), keep=["r", "t"])
     assert found.carriers == {"q": "r", "p": "r", "s": "t"}
 
 
@@ -148,12 +148,12 @@ def test_welded_to_the_ground(rng: np.random.Generator) -> None:
     scene = mstmm.Scene(
         **given | {"hinge": [weld, *given["hinge"][1:]], "spring": springs, "load": loads}
     )
-    found = same(scene)
+    found = merge_and_compare(scene)
     assert [body.name for body in found.scene.body] == ["s"]
     assert found.carriers == {"p": "ground", "q": "ground", "r": "ground", "t": "s"}
     assert set(found.idle) == {'load "load1"', 'spring "idle"'}
     assert any(text.startswith("the ground: merged with") for text in found.descriptions)
-    stays = same(scene, keep=["q"])
+    stays = merge_and_compare(scene, keep=["q"])
     assert [body.name for body in stays.scene.body] == ["q", "s"]
 
 

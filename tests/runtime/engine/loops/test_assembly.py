@@ -10,8 +10,8 @@ from tests.support.scenes.published_mechanisms import Scene, andrews, four_bars
 from tests.system.loops.test_four_bar import PINS, angles, linkage
 
 
-def shaken(scene: Scene, seed: int, size: float, kept: str) -> Scene:
-    """Start values off by up to `size`, but for those of a hinge, which are held."""
+def perturbed_scene(scene: Scene, seed: int, size: float, kept: str) -> Scene:
+    """The scene with starts changed by up to `size`, except that of a hinge, which is held."""
     draw = np.random.default_rng(seed)
     for hinge in scene["hinge"]:
         start = hinge.setdefault("initial", {})
@@ -26,7 +26,7 @@ def shaken(scene: Scene, seed: int, size: float, kept: str) -> Scene:
 @pytest.mark.parametrize("seed", range(10))
 def test_a_crank_that_is_held(seed: int) -> None:
     model = mstmm.compile(
-        mstmm.Scene(**shaken(linkage("closing_pin", laws=False), seed, 0.3, "crank_pin"))
+        mstmm.Scene(**perturbed_scene(linkage("closing_pin", laws=False), seed, 0.3, "crank_pin"))
     )
     q, _ = model.initial_state()
     assert q[0] == 0.7
@@ -35,10 +35,10 @@ def test_a_crank_that_is_held(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(5))
 def test_forty_windows_and_a_squeezer(seed: int) -> None:
-    windows = mstmm.compile(mstmm.Scene(**shaken(four_bars(40, 1.2), seed, 0.3, "foot0")))
+    windows = mstmm.compile(mstmm.Scene(**perturbed_scene(four_bars(40, 1.2), seed, 0.3, "foot0")))
     q, _ = windows.initial_state()
     assert np.abs(np.abs(q[:41]) - 1.2).max() < 1e-8
-    squeezer = mstmm.compile(mstmm.Scene(**shaken(andrews(), seed, 0.3, "beta")))
+    squeezer = mstmm.compile(mstmm.Scene(**perturbed_scene(andrews(), seed, 0.3, "beta")))
     assert abs(squeezer.initial_state()[0][0] + 0.0617138900142764) < 1e-15
 
 

@@ -22,7 +22,7 @@ def hinge(scene: Scene, name: str) -> Scene:
     return found
 
 
-def driven(**drives: str) -> Scene:
+def driven_four_bar(**drives: str) -> Scene:
     scene = four_bar()
     for name, text in drives.items():
         hinge(scene, name).pop("initial", None)
@@ -52,24 +52,24 @@ SHARED = (
 LEAD = {"name": "lead", "expression": "end.q", "equals": "1 + t"}
 REFUSED = {
     "drives that cannot be": (
-        driven(foot="0.9", end="1.2"),
+        driven_four_bar(foot="0.9", end="1.2"),
         r'has a gap of 0\.10.* m with "foot", "end" fixed; ' + SHARED,
     ),
     "drives at odds in speed": (
-        driven(foot="0.9 + t", end=f"{REST!r}"),
+        driven_four_bar(foot="0.9 + t", end=f"{REST!r}"),
         r'speeds given for "foot", "end" are inconsistent .* m/s.*; ' + SHARED,
     ),
     "drives a little apart": (
-        driven(foot="0.9 + t", end=f"{REST + 4e-3!r} + t"),
+        driven_four_bar(foot="0.9 + t", end=f"{REST + 4e-3!r} + t"),
         r"(violated by|gap of) 0\.00.*[:;] " + SHARED,
     ),
     "drives of cut hinges": (
-        driven(foot="0.9 + t", tip="0.3 + t"),
+        driven_four_bar(foot="0.9 + t", tip="0.3 + t"),
         r'rad with "foot", "tip" fixed; '
         r'the drives of hinges "foot" and "tip" move the same degree of freedom',
     ),
     "a drive and a wish": (
-        driven(foot="0.9 + t") | {"coupling": [LEAD]},
+        driven_four_bar(foot="0.9 + t") | {"coupling": [LEAD]},
         r'with "foot" fixed.*drive fewer',
     ),
     "more held than is free": (
@@ -96,14 +96,16 @@ def test_what_is_refused_is_told(what: str) -> None:
 
 def test_drives_that_part_on_the_way_are_told() -> None:
     """At rest at the start they agree."""
-    result = compile_scene(driven(foot="0.9", end=f"{REST!r} + t^2")).simulate(0.5, "dop853")
+    result = compile_scene(driven_four_bar(foot="0.9", end=f"{REST!r} + t^2")).simulate(
+        0.5, "dop853"
+    )
     assert not result.success
     assert re.search(f"no nearby state closes it; {SHARED}", result.message)
 
 
 def test_three_drives_on_two_freedoms() -> None:
     """Two four-bars, one of them driven twice: only its own drives are named."""
-    one, other = driven(foot="0.9 + t", end=f"{REST!r}"), driven(foot="0.9 + t")
+    one, other = driven_four_bar(foot="0.9 + t", end=f"{REST!r}"), driven_four_bar(foot="0.9 + t")
     for body in other["body"]:
         body["name"] += "2"
     for joint in other["hinge"]:
@@ -129,7 +131,7 @@ def test_one_drive_too_many_of_a_chain_of_windows() -> None:
 
 def test_what_agrees_is_taken() -> None:
     """As many drives and holds as one likes, where they say the same."""
-    assert compile_scene(driven(foot="0.9", end=f"{REST!r}")).simulate(0.1).success
+    assert compile_scene(driven_four_bar(foot="0.9", end=f"{REST!r}")).simulate(0.1).success
     assert compile_scene(hold_hinges("foot", "knee", "tip", "end")).loops.mobility == 1
 
 
@@ -156,7 +158,7 @@ def test_one_speed_beside_a_singular_pose(angle: float) -> None:
 
 def test_a_trajectory_that_does_not_close_fails_alone() -> None:
     """The third crank stands where the short coupler does not reach."""
-    scene = driven(foot="a + t")
+    scene = driven_four_bar(foot="a + t")
     scene["input"] = [{"name": "a", "value": 0.9, "rates": [0, 0], "unit": "rad"}]
     next(body for body in scene["body"] if body["name"] == "coupler")["ends"]["tip"][0] = 0.95
     model = compile_scene(scene)

@@ -75,8 +75,8 @@ def wrap_angle(angle: Array | float) -> Any:
     return (np.asarray(angle) + np.pi) % (2 * np.pi) - np.pi
 
 
-def off(model: mstmm.Model, q: Array, wanted: dict[str, float]) -> float:
-    """The largest angle by which a state is not as wanted."""
+def largest_angle_error(model: mstmm.Model, q: Array, wanted: dict[str, float]) -> float:
+    """Largest difference of the angles of a state from those wanted, rad."""
     slots = model.coordinate_layout.hinges
     return max(abs(float(wrap_angle(q[slots[name].q] - angle))) for name, angle in wanted.items())
 
@@ -89,7 +89,7 @@ def test_the_starts_of_cut_hinges_count(cut: str, sides: tuple[int, int], crank:
     wanted = angles(crank, sides)
     starts = {name: wanted[name] for name in ("foot", "knee", "heel", "arm", "toe")}
     model = mstmm.compile(mstmm.Scene(**linkage(starts, cut, 2)))
-    assert off(model, model.initial_state()[0], wanted) < 1e-9
+    assert largest_angle_error(model, model.initial_state()[0], wanted) < 1e-9
 
 
 def test_zeros_of_hinges_that_close_loops_are_none() -> None:
@@ -97,7 +97,7 @@ def test_zeros_of_hinges_that_close_loops_are_none() -> None:
     wanted = angles(-3.0, (1, 1))
     starts = {name: wanted[name] for name in ("foot", "knee", "heel", "arm", "toe")}
     model = mstmm.compile(mstmm.Scene(**linkage(starts | {"tip": 0.0, "top": 0.0}, dyads=2)))
-    assert off(model, model.initial_state()[0], wanted) < 1e-9
+    assert largest_angle_error(model, model.initial_state()[0], wanted) < 1e-9
 
 
 @pytest.mark.parametrize("cut", ["heel", "tip"])
@@ -115,7 +115,7 @@ def test_a_crank_takes_the_nearest_branch_at_every_angle(side: int, cut: str) ->
             far = [sum(float(wrap_angle(one[n] - given[n])) ** 2 for n in names) for one in both]
             model = mstmm.compile(mstmm.Scene(**linkage(given, cut)))
             nearest = both[int(np.argmin(far))]
-            assert off(model, model.initial_state()[0], nearest) < 1e-9
+            assert largest_angle_error(model, model.initial_state()[0], nearest) < 1e-9
             found = model.loops.branches[0].distance
             assert abs(found - math.sqrt(min(far))) < 1e-6
 
@@ -129,11 +129,11 @@ def test_all_branches_are_told() -> None:
         }
         model = mstmm.compile(mstmm.Scene(**linkage(starts, dyads=2)))
         branches = model.loops.branches
-        assert off(model, branches[0].q, wanted) < 1e-9
+        assert largest_angle_error(model, branches[0].q, wanted) < 1e-9
         assert sorted(one.distance for one in branches) == [one.distance for one in branches]
         for sides in itertools.product((1, -1), repeat=2):
             other = angles(0.4, sides)
-            assert sum(off(model, one.q, other) < 1e-9 for one in branches) == 1
+            assert sum(largest_angle_error(model, one.q, other) < 1e-9 for one in branches) == 1
         assert branches[0].pose["foot"] == (0.4,)
 
 
@@ -146,7 +146,7 @@ def test_a_state_on_another_branch() -> None:
             q[model.coordinate_layout.hinges["foot"].q] = crank
             found, _ = model.assemble(q, hold=["foot"], branch=number)
             assert found[model.coordinate_layout.hinges["foot"].q] == crank
-            assert off(model, found, angles(crank, (side,))) < 1e-9
+            assert largest_angle_error(model, found, angles(crank, (side,))) < 1e-9
     impossible: list[Any] = [2, -1, True, 1.0]
     for number in impossible:
         with pytest.raises(mstmm.SceneError, match=r"expected 0 to 1, see loops\.branches"):
@@ -162,7 +162,10 @@ def test_a_path_stays_on_its_branch() -> None:
         found = model.assemble_path(rows, ["foot"], number)
         for row, q in zip(rows, found, strict=True):
             assert (
-                off(model, q, angles(row[model.coordinate_layout.hinges["foot"].q], (side,))) < 1e-9
+                largest_angle_error(
+                    model, q, angles(row[model.coordinate_layout.hinges["foot"].q], (side,))
+                )
+                < 1e-9
             )
 
 
@@ -175,7 +178,7 @@ def test_the_state_nearest_to_what_is_asked() -> None:
         for name, angle in wanted.items():
             q[model.coordinate_layout.hinges[name].q] = angle + 0.1 * (name == "knee")
         found, _ = model.assemble(q, hold=["foot"])
-        assert off(model, found, wanted) < 1e-9
+        assert largest_angle_error(model, found, wanted) < 1e-9
 
 
 def test_a_closed_start_stays_as_it_is() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import mstmm
-from tests.reference.random_loops import random_mechanism, torn
+from tests.reference.random_loops import closure_jacobian, random_mechanism
 from tests.reference.tree import read
 from tests.support.scenes.linkages import OBLIQUE, bricard, cranks, four_bar, legs
 from tests.support.scenes.published_mechanisms import four_bars
@@ -50,5 +50,5 @@ def test_random_mechanisms_keep_what_their_rows_leave(seed: int) -> None:
     scene, q, _ = random_mechanism(seed, laws=False)
     tree = read(scene)
     found = loops(scene)
-    assert found.mobility == tree.nu - np.linalg.matrix_rank(torn(tree, q), tol=1e-8)
+    assert found.mobility == tree.nu - np.linalg.matrix_rank(closure_jacobian(tree, q), tol=1e-8)
     assert found.rank == len(found.constraint_rows) and not found.singular

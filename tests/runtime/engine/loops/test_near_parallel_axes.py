@@ -26,7 +26,8 @@ def hinge_changes(name: str, **keys: Any) -> dict[str, Any]:
     return {name: keys}
 
 
-def off(tilt: float) -> str:
+def tilt_text(tilt: float) -> str:
+    """Angle of the tilt as messages print it."""
     return f"{tilt:.3g} rad ({math.degrees(tilt):.3g} deg)"
 
 
@@ -36,7 +37,7 @@ def test_a_tilted_axis_is_named(name: str, tilt: float) -> None:
     axis = [math.sin(tilt), 0.0, math.cos(tilt)]
     before, behind = (NAMES[(NAMES.index(name) + k) % 4] for k in (-1, 1))
     told = refusal_message(four_bar(tilt=OBLIQUE, **hinge_changes(name, axis=axis)))
-    assert f'; the axis of hinge "{name}" is {off(tilt)} from parallel to those of ' in told
+    assert f'; the axis of hinge "{name}" is {tilt_text(tilt)} from parallel to those of ' in told
     assert f'"{before}" and "{behind}"' in told or f'"{behind}" and "{before}"' in told
     assert told.endswith("; make it parallel by an exact axis and orientation, or replace it "
                          "by a ball hinge")  # fmt: skip
@@ -53,7 +54,7 @@ def test_a_tilted_axis_is_named(name: str, tilt: float) -> None:
 )
 def test_what_the_tilt_does_comes_first(tilt: float, found: str) -> None:
     told = refusal_message(four_bar(end={"axis": [math.sin(tilt), 0, math.cos(tilt)]}))
-    assert found in told and f'; the axis of hinge "end" is {off(tilt)} from parallel' in told
+    assert found in told and f'; the axis of hinge "end" is {tilt_text(tilt)} from parallel' in told
 
 
 @pytest.mark.parametrize("tilt", [5e-4, 1e-3])
@@ -62,19 +63,21 @@ def test_a_run_that_locks_names_the_axis(tilt: float) -> None:
     scene = four_bar(speed=1.0, knee={"axis": [math.sin(tilt), 0, math.cos(tilt)]})
     run = mstmm.compile(mstmm.Scene(**scene), engine="looped").simulate(2.0, "dop853")
     assert not run.success and run.t[-1] < 1.0
-    assert f'no nearby state closes it; the axis of hinge "knee" is {off(tilt)}' in run.message
+    assert (
+        f'no nearby state closes it; the axis of hinge "knee" is {tilt_text(tilt)}' in run.message
+    )
 
 
 def test_speeds_that_a_tilted_axis_does_not_allow() -> None:
     told = refusal_message(four_bar(speed=1.0, knee={"axis": [math.sin(2e-3), 0, math.cos(2e-3)]}))
     assert "are inconsistent by" in told
-    assert f'; the axis of hinge "knee" is {off(2e-3)} from parallel' in told
+    assert f'; the axis of hinge "knee" is {tilt_text(2e-3)} from parallel' in told
 
 
 @pytest.mark.parametrize("cut", NAMES)
 def test_the_cut_makes_no_difference(cut: str) -> None:
     told = refusal_message(four_bar(cut=cut, knee={"axis": [math.sin(0.02), 0, math.cos(0.02)]}))
-    assert f'; the axis of hinge "knee" is {off(0.02)} from parallel' in told
+    assert f'; the axis of hinge "knee" is {tilt_text(0.02)} from parallel' in told
 
 
 @pytest.mark.parametrize(
@@ -84,8 +87,9 @@ def test_the_cut_makes_no_difference(cut: str) -> None:
 def test_an_orientation_tilts_one_end(name: str, pair: tuple[str, str, str]) -> None:
     """Of two axes on one body nothing says which is meant."""
     told = refusal_message(four_bar(**hinge_changes(name, orientation=[0.0, 0.01, 0.0])))
+    angle = re.escape(tilt_text(0.01))
     assert re.search(f'; the axes of hinges "({pair[0]}|{pair[1]})" and "({pair[0]}|{pair[1]})" on '
-                     f"{pair[2]} are {re.escape(off(0.01))} from parallel; make", told)  # fmt: skip
+                     f"{pair[2]} are {angle} from parallel; make", told)  # fmt: skip
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -120,7 +124,10 @@ def slider_crank(rail: dict[str, Any], top: str = "pin") -> dict[str, Any]:
 def test_a_rail_that_leaves_the_plane() -> None:
     axis = [math.cos(0.02), 0.0, math.sin(0.02)]
     told = refusal_message(slider_crank({"axis": axis}))
-    assert f'; the axis of hinge "rail" is {off(0.02)} out of the plane in which the pins' in told
+    assert (
+        f'; the axis of hinge "rail" is {tilt_text(0.02)} out of the plane in which the pins'
+        in told
+    )
     loops = mstmm.compile(mstmm.Scene(**slider_crank({"axis": axis}, "cylindrical"))).loops
     assert loops.mobility == 1
 

@@ -162,12 +162,12 @@ def test_threads_do_not_meet() -> None:
     states = [state(k) for k in range(40)]
     alone = [one.accelerations(q, u) for q, u, *_ in states]
 
-    def again(k: int) -> bool:
+    def matches_serial_result(k: int) -> bool:
         q, u, *_ = states[k % 40]
         return np.array_equal(one.accelerations(q, u), alone[k % 40])
 
     with ThreadPoolExecutor(4) as pool:
-        assert all(pool.map(again, range(400)))
+        assert all(pool.map(matches_serial_result, range(400)))
 
 
 def alone() -> SingleStateCalls:

@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 MOMENTS = ("first", "second", "C", "E", "F", "K")
 
 
-def same(one: ModalBody, other: ModalBody, tolerance: float) -> None:
+def assert_same_body(one: ModalBody, other: ModalBody, tolerance: float) -> None:
     for key in MOMENTS:
         a, b = getattr(one, key), getattr(other, key)
         assert np.abs(a - b).max() <= tolerance * np.abs(a).max(), key
@@ -45,7 +45,7 @@ def test_file(tmp_path: Path, scalar: bool, order: str, dense: bool) -> None:
     ms = model.scalar_mass if scalar else None
     path = save_matrices(tmp_path / "bar.npz", mass, stiffness, model.nodes, ms, order)
     found = bar.body(bar.from_arrays(matrices=str(path)))
-    same(bar.body(bar.table(box=bar.short(), stiffening=False)), found, 1e-12)
+    assert_same_body(bar.body(bar.table(box=bar.short(), stiffening=False)), found, 1e-12)
     assert "all moments exact" in found.notes[-1]
     assert any("no geometric stiffening" in note for note in found.notes)
 
@@ -71,11 +71,11 @@ def uneven_mass(nodes: Array) -> Array:
     draw = np.random.default_rng(4)
     lumps = np.kron(np.diag([1.0, 2.0, 1.5, 0.5]), np.eye(3))
     strain = draw.normal(size=(12, 12))
-    strain -= strain @ np.linalg.pinv(_rigid(nodes)).T @ _rigid(nodes).T
+    strain -= strain @ np.linalg.pinv(_rigid_displacements(nodes)).T @ _rigid_displacements(nodes).T
     return np.asarray(lumps + 0.05 * strain.T @ strain)
 
 
-def _rigid(nodes: Array) -> Array:
+def _rigid_displacements(nodes: Array) -> Array:
     unit = np.eye(3)
     turned = [np.cross(axis, nodes).ravel() for axis in unit]
     return np.stack([*(np.tile(axis, len(nodes)) for axis in unit), *turned], axis=1)
@@ -89,7 +89,7 @@ def test_moments_of_a_mass_that_is_not_scalar() -> None:
     shapes = np.random.default_rng(5).normal(size=(12, 3))
     found = field_moments(model, shapes)
     assert "not scalar" in found.how
-    rigid = _rigid(nodes)
+    rigid = _rigid_displacements(nodes)
     inertia, carried = rigid.T @ mass @ rigid, rigid.T @ mass @ shapes
     c = found.first
     cross = np.array([[0, -c[2], c[1]], [c[2], 0, -c[0]], [-c[1], c[0], 0]])

@@ -35,7 +35,7 @@ def bar_mesh() -> Any:
     )
 
 
-def written(path: Path, mesh: Any, **how: Any) -> Path:
+def write_mesh(path: Path, mesh: Any, **how: Any) -> Path:
     meshio.write(path, mesh, **how)
     return path
 
@@ -46,7 +46,7 @@ def table(path: Path, **changes: Any) -> dict[str, Any]:
 
 
 def test_gmsh_file_with_named_surfaces(tmp_path: Path) -> None:
-    path = written(tmp_path / "bar.msh", bar_mesh(), file_format="gmsh22", binary=False)
+    path = write_mesh(tmp_path / "bar.msh", bar_mesh(), file_format="gmsh22", binary=False)
     found = bar.body(table(path))
     assert found.mass == pytest.approx(bar.MASS, rel=1e-12)
     assert np.allclose(found.first, [bar.MASS / 2, 0, 0], atol=1e-12)
@@ -64,7 +64,7 @@ def test_curved_cells(tmp_path: Path) -> None:
     points = curved.doflocs.copy()
     points[1] += 0.2 * points[0] ** 2
     bent = type(curved)(points, curved.t)
-    path = written(tmp_path / "bar.vtu", skfem.io.meshio.to_meshio(bent))
+    path = write_mesh(tmp_path / "bar.vtu", skfem.io.meshio.to_meshio(bent))
     ends = {"root": {"plane": [1, 0, 0, 0.0]}, "tip": {"plane": [1, 0, 0, 1.0]}}
     found = bar.body(table(path, scale=None, ends=ends))
     assert found.mass == pytest.approx(bar.MASS, rel=1e-12)
@@ -83,7 +83,7 @@ def test_curved_cells(tmp_path: Path) -> None:
     ],
 )
 def test_refused(tmp_path: Path, changes: dict[str, Any], words: str) -> None:
-    path = written(tmp_path / "bar.msh", bar_mesh(), file_format="gmsh22", binary=False)
+    path = write_mesh(tmp_path / "bar.msh", bar_mesh(), file_format="gmsh22", binary=False)
     elastic = table(path, **changes)
     with pytest.raises(SceneError, match=words) as caught:
         elastic_bodies(mstmm.Scene(
@@ -102,7 +102,7 @@ def test_files_that_are_no_solid_meshes(tmp_path: Path) -> None:
         bar.body(table(text))
     flat = meshio.Mesh(np.eye(3), [("triangle", [[0, 1, 2]])])
     with pytest.raises(SceneError, match=r"expected solid cells of one kind .* found none"):
-        bar.body(table(written(tmp_path / "flat.vtu", flat)))
+        bar.body(table(write_mesh(tmp_path / "flat.vtu", flat)))
 
 
 @pytest.mark.parametrize("ending", ["vtu", "msh", "xdmf", "inp"])
@@ -111,7 +111,7 @@ def test_cells_with_nodes_that_are_not_there(tmp_path: Path, ending: str, node: 
     cells = np.array([[0, 1, 2, 3], [1, 2, 3, 4]])
     points = np.vstack([np.zeros(3), np.eye(3), np.ones(3)])
     cells[1, 2] = node
-    path = written(tmp_path / f"bar.{ending}", meshio.Mesh(points, [("tetra", cells)]))
+    path = write_mesh(tmp_path / f"bar.{ending}", meshio.Mesh(points, [("tetra", cells)]))
     with pytest.raises(
         SceneError, match=r'elastic "bar": bar.*: expected cells of nodes|not a mesh'
     ):
@@ -184,7 +184,7 @@ def test_stiffness_is_that_of_the_form_of_vectors(element: str) -> None:
 def test_missing_extra_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, package: str
 ) -> None:
-    path = written(tmp_path / "bar.vtu", bar_mesh())
+    path = write_mesh(tmp_path / "bar.vtu", bar_mesh())
     monkeypatch.setitem(sys.modules, package, None)
     with pytest.raises(EnvironmentFailure, match=rf"needs the package {package}.*mstmm\[fem\]"):
         bar.body(table(path))

@@ -82,12 +82,12 @@ def test_a_change_is_refused_where_it_makes_no_sense(lab: Lab) -> None:
 
 
 def test_a_state_of_a_changed_run_goes_on_bit_for_bit(lab: Lab) -> None:
-    def begun() -> Integrator:
+    def start_run() -> Integrator:
         run = bouncing(lab).run("dop853", 1.2, START)
         run.advance(60.0, 6)
         return run
 
-    whole = begun()
+    whole = start_run()
     whole.switch_method(get("rodas4p2"))
     state, earlier = whole.state(), whole.take_samples()
     assert whole.advance(60.0) is Status.FINISHED

@@ -75,15 +75,15 @@ def reference_motion(radius: float, h: float, steps: int) -> tuple[Array, Array,
 
 
 @pytest.fixture(scope="module")
-def swung() -> mstmm.Model:
+def pendulum_model() -> mstmm.Model:
     return mstmm.compile(pendulum())
 
 
 @pytest.mark.parametrize("radius", [0.0, 0.6, 0.9])
-def test_printed_equations(radius: float, swung: mstmm.Model) -> None:
+def test_printed_equations(radius: float, pendulum_model: mstmm.Model) -> None:
     h, steps = 0.02, 60
     q, u, _ = reference_motion(radius, h, steps)
-    result = swung.simulate(
+    result = pendulum_model.simulate(
         h * steps,
         mstmm.methods.GeneralizedAlpha("genalpha-index3", radius=radius),
         step=h,
@@ -95,18 +95,20 @@ def test_printed_equations(radius: float, swung: mstmm.Model) -> None:
     # Iterations with fixed steps end at 1e-3 of a step's error.
     assert np.abs(result.q[:, :3] - q).max() < 3e-6
     assert np.abs(result.u[:, :3] - u).max() < 2e-5
-    exact = swung.simulate(h * steps, rtol=1e-11, output_times=[0.0, h * steps]).q[-1, :3]
+    exact = pendulum_model.simulate(h * steps, rtol=1e-11, output_times=[0.0, h * steps]).q[-1, :3]
     assert np.abs(exact - q[-1]).max() > 1e-4
     assert np.abs(result.q[:, 3] - result.q[:, 2]).max() < 1e-12  # the pin's own angle
 
 
-def test_multipliers_are_of_second_order(swung: mstmm.Model) -> None:
+def test_multipliers_are_of_second_order(pendulum_model: mstmm.Model) -> None:
     """Those of the printed equations, and the load of the pin at states of the run."""
     end = 0.8
-    wanted = swung.simulate(end, rtol=1e-12, atol=1e-13, output_times=[0.0, end]).force("pin")[-1]
+    wanted = pendulum_model.simulate(end, rtol=1e-12, atol=1e-13, output_times=[0.0, end]).force(
+        "pin"
+    )[-1]
     errors = []
     for steps in (80, 160):
-        run = swung.simulate(
+        run = pendulum_model.simulate(
             end, "genalpha-index3", step=end / steps, rtol=1e-11, output_times=[0.0, end]
         )
         lam = reference_motion(0.8, end / steps, steps)[2][-1]
@@ -197,7 +199,7 @@ def bar() -> mstmm.Model:
     return mstmm.compile(mstmm.Scene(**four_bar(speed=3.0)))
 
 
-def off(run: mstmm.Result, model: mstmm.Model) -> float:
+def largest_speed_error(run: mstmm.Result, model: mstmm.Model) -> float:
     """Largest error of the speeds, rad/s, beside DOP853."""
     assert run.success, run.message
     exact = model.simulate(float(run.t[-1]), rtol=1e-11, atol=1e-13, output_times=run.t)
@@ -211,13 +213,13 @@ def test_a_break_just_before_the_grid(method: str, before: float, bar: mstmm.Mod
     load = {"on": "coupler", "force": [f"where(t < {0.2 - before:.14f}, 0, 1e-9)", 0, 0]}
     model = mstmm.compile(mstmm.Scene(**four_bar(speed=3.0), load=[load]))
     at: dict[str, Any] = {"step": STEP, "output_times": np.linspace(0.2, END, 201)}
-    errors = [off(one.simulate(END, method, **at), bar) for one in (model, bar)]
+    errors = [largest_speed_error(one.simulate(END, method, **at), bar) for one in (model, bar)]
     print(errors)
     assert errors[0] < 1.2 * errors[1]
 
 
 def off_in_ticks(model: mstmm.Model, tick: float, step: float, radius: float) -> float:
-    """`off` of a session in ticks of `tick` s."""
+    """`largest_speed_error` of a session in ticks of `tick` s."""
     session = model.session(
         method=mstmm.methods.GeneralizedAlpha("genalpha-index3", radius=radius), step=step
     )
@@ -251,7 +253,7 @@ def test_bounces_just_before_the_grid() -> None:
         event = {"when": f"foot.q > {stop:.12f}", "do": "bounce", "restitution": 0.6}
         model = mstmm.compile(mstmm.Scene(**scene, event=[event]))
         run = model.simulate(0.25, "genalpha-index3", step=STEP, **end)
-        errors.append(off(run, model))
+        errors.append(largest_speed_error(run, model))
     print(errors)
     assert max(errors) < 2 * np.median(errors) < 1e-3
 
@@ -273,9 +275,11 @@ def test_equal_runs_give_equal_bits(bar: mstmm.Model) -> None:
         ("rk4-index3", 'method "rk4-index3" is not known'),
     ],
 )
-def test_refused(asked: str | mstmm.methods.Method, words: str, swung: mstmm.Model) -> None:
+def test_refused(
+    asked: str | mstmm.methods.Method, words: str, pendulum_model: mstmm.Model
+) -> None:
     with pytest.raises(SceneError, match=words):
-        swung.simulate(0.1, asked, step=1e-2)
+        pendulum_model.simulate(0.1, asked, step=1e-2)
 
 
 def test_a_tree_has_nothing_to_ask() -> None:

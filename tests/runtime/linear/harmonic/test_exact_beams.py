@@ -123,7 +123,7 @@ def test_a_shaft_with_a_disk_and_a_rod_with_a_mass() -> None:
 # --- natural motions by count ---------------------------------------------------------------------
 
 
-def cut(parts: int, **hinge: Any) -> mstmm.Model:
+def divided_beam_model(parts: int, **hinge: Any) -> mstmm.Model:
     """A unit beam along x in welded parts."""
     beams = [{"name": f"b{k}", **UNIT, "length": 1.0 / parts, "modes": {"y": 2}}
              for k in range(parts)]  # fmt: skip
@@ -146,14 +146,14 @@ def roots(function: Any, count: int, first: float) -> Any:
 def test_two_hundred_frequencies_of_a_cantilever(parts: int, digits: float) -> None:
     """cos x = -1 / cosh x; none missed, none twice, where determinants end at the eleventh."""
     expected = roots(lambda x: np.cos(x) + 1 / np.cosh(x), 200, np.pi / 2 + 0.2)
-    found = cut(parts).dynamic_stiffness_modes(200)
+    found = divided_beam_model(parts).dynamic_stiffness_modes(200)
     assert found.is_complete and len(found) == 200
     np.testing.assert_allclose(np.sqrt(found.omega), expected, rtol=digits)
 
 
 def test_pinned_and_free() -> None:
     """tan x = tanh x behind a motion of frequency 0."""
-    found = cut(1, type="pin", axis=[0, 0, 1]).dynamic_stiffness_modes(60)
+    found = divided_beam_model(1, type="pin", axis=[0, 0, 1]).dynamic_stiffness_modes(60)
     assert found.omega[0] == 0
     expected = roots(lambda x: np.sin(x) - np.tanh(x) * np.cos(x), 59, 5 * np.pi / 4)
     np.testing.assert_allclose(np.sqrt(found.omega[1:]), expected, rtol=1e-9)

@@ -98,7 +98,7 @@ def test_a_double_pendulum_against_another_integrator(asked: float) -> None:
     np.testing.assert_array_equal(run.t, times)
 
 
-def stiff(count: int, k: float, zeta: float) -> mstmm.Model:
+def stiff_row_model(count: int, k: float, zeta: float) -> mstmm.Model:
     """Rods in a row on bushings of k N/m."""
     model = pendulums(count, math.pi / 2)
     c = 2 * zeta * math.sqrt(k)
@@ -115,7 +115,7 @@ def stiff(count: int, k: float, zeta: float) -> mstmm.Model:
 
 
 def test_stiff_motion_is_reached_by_an_implicit_method() -> None:
-    model = stiff(4, 1e8, 1.0)
+    model = stiff_row_model(4, 1e8, 1.0)
     run = model.simulate(1.0, error=mstmm.ErrorRequest(1e-3, of="rod3.tip.position"))
     known = run.achieved_error
     assert known is not None and known.is_met
@@ -281,7 +281,7 @@ def test_a_later_run_that_fails_leaves_the_one_before() -> None:
 
 def test_an_implicit_run_that_finds_no_step_gives_way(monkeypatch: pytest.MonkeyPatch) -> None:
     """The first run of a stiff scene, by an implicit method, is made to fail."""
-    model = stiff(2, 1e8, 1.0)
+    model = stiff_row_model(2, 1e8, 1.0)
     real = run_execution.first_run
 
     def first_run(model: Any, settings: Settings, *rest: Any, **more: Any) -> Any:

@@ -35,12 +35,12 @@ def test_a_bead_against_its_own_equation(when: str, entry: int) -> None:
         push = 9.81 * SLOPE + WIND * y[0] - DRAG * y[1]
         return [float(y[1]), float(push) / (1 + SLOPE**2)]
 
-    def there(t: float, y: np.ndarray[tuple[int], np.dtype[np.float64]]) -> float:
+    def stop_condition(t: float, y: np.ndarray[tuple[int], np.dtype[np.float64]]) -> float:
         return float(y[entry]) - 1.0
 
-    there.terminal = True  # type: ignore[attr-defined]
+    stop_condition.terminal = True  # type: ignore[attr-defined]
     found = scipy.integrate.solve_ivp(
-        rates, (0.0, 2.0), [0.0, 0.0], "DOP853", events=there, rtol=1e-12, atol=1e-13
+        rates, (0.0, 2.0), [0.0, 0.0], "DOP853", events=stop_condition, rtol=1e-12, atol=1e-13
     )
     run = mstmm.compile(mstmm.Scene(**bead(when)), engine="looped").simulate(2.0, rtol=1e-10)
     assert "stopped by event" in run.message

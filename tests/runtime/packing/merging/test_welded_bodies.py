@@ -31,8 +31,8 @@ def worst(a: Any, b: Any) -> float:
     return float(np.abs(a - b).max(initial=0.0) / max(np.abs(b).max(initial=0.0), 1e-30))
 
 
-def both(scene: mstmm.Scene, **options: Any) -> tuple[mstmm.Model, mstmm.Model]:
-    """The scene simplified, and as it is described."""
+def merged_and_full_models(scene: mstmm.Scene, **options: Any) -> tuple[mstmm.Model, mstmm.Model]:
+    """Models of the simplified scene, and of the scene as it is described."""
     options = {"engine": "looped"} | options
     return mstmm.compile(scene, **options), mstmm.compile(scene, simplify=False, **options)
 
@@ -57,7 +57,7 @@ def arm(count: int = 4, **more: Any) -> mstmm.Scene:
 def test_drawn_scenes_are_the_same(seed: int) -> None:
     print("seed", seed)
     scene = mstmm.Scene(**random_scene(seed, types=KINDS))
-    few, all_ = both(scene)
+    few, all_ = merged_and_full_models(scene)
     merged = {one.elements for one in non_link_simplifications(few)}
     assert few.packed_scene.topology.count == len(scene.body) - len(merged)
     assert (
@@ -115,7 +115,7 @@ def test_a_hinge_that_is_asked_of_or_lets_go_stays(stays: dict[str, Any]) -> Non
 
 
 def test_parameters_of_a_body_that_is_part_of_another() -> None:
-    few, all_ = both(arm())
+    few, all_ = merged_and_full_models(arm())
     changes = {"rod2.mass": 5.0, "rod3.center_of_mass[1]": 0.2, "rod2.ends.tip.position[0]": 1.3}
     q, u = np.array([0.3, -0.4]), np.array([1.0, 2.0])
     there = [one.with_parameters(changes) for one in (few, all_)]
@@ -135,7 +135,7 @@ def test_parameters_of_a_body_that_is_part_of_another() -> None:
 
 def test_what_acts_on_a_part_acts_on_the_whole() -> None:
     """Loads along its axes, springs, bushings, events and controllers that read where it is."""
-    few, all_ = both(
+    few, all_ = merged_and_full_models(
         arm(
             load=[{"name": "push", "on": "rod2.tip", "force": [1, "sin(t)", 0], "axes": "body"},
                   {"name": "turned", "on": "rod4", "force": [3, 0, 0], "axes": "rod3"}],
@@ -174,7 +174,7 @@ def test_what_is_done_or_not_is_said_by_true_or_false(word: str) -> None:
 
 def test_where_loops_are_closed_nothing_is_merged_but_couplings_couple_parts() -> None:
     row = {"name": "follows", "expression": "shoulder.q^2 + elbow.q", "equals": 0.9}
-    few, all_ = both(arm(coupling=[row]))
+    few, all_ = merged_and_full_models(arm(coupling=[row]))
     assert len(non_link_simplifications(few)) == 2 and few.loops == all_.loops
     runs = [one.simulate(0.3, rtol=1e-11, atol=1e-13) for one in (few, all_)]
     for name in ("weld.force", "splice.moment", "rod3.tip.position", "rod2.momentum"):
@@ -201,7 +201,7 @@ def test_flexible_bodies_hang_on_parts(level: str) -> None:
            {"name": "on", "type": "fixed", "inboard": "rod5.tip", "outboard": "rod4"}]  # fmt: skip
     bodies = [ROD | {"name": f"rod{i}"} for i in (1, 2, 3, 4, 5)]
     scene = arm(body=bodies, beam=[beam], hinge=[*HINGES[:3], root, *tip])
-    few, all_ = both(scene, flexibility=level)
+    few, all_ = merged_and_full_models(scene, flexibility=level)
     merged = [one.elements[1:] for one in non_link_simplifications(few)]
     expected = [("rod2", "rod1"), ("rod3", "rod1"), ("rod4", "rod5")]
     assert merged == (expected if level == "coupled" else [])
@@ -214,7 +214,7 @@ def test_flexible_bodies_hang_on_parts(level: str) -> None:
 
 
 def test_the_classical_method_has_its_own_matrices_for_every_body() -> None:
-    few, all_ = both(arm())
+    few, all_ = merged_and_full_models(arm())
     runs = [one.simulate(0.1, "dttmm-classical", step=0.01) for one in (few, all_)]
     assert np.array_equal(runs[0].q, runs[1].q)
 

@@ -65,10 +65,12 @@ def held_loads(run: Result) -> tuple[Array, Array]:
     axes = run.orientation("blade.root")
     w, v = axes[:, :1], axes[:, 1:]
 
-    def out(local: Array) -> Array:
+    def rotate_to_inertial(local: Array) -> Array:
         return local + 2 * np.cross(v, np.cross(v, local) + w * local)
 
-    return -out(run.section_force("blade", 0.0)), -out(run.section_moment("blade", "root"))
+    return -rotate_to_inertial(run.section_force("blade", 0.0)), -rotate_to_inertial(
+        run.section_moment("blade", "root")
+    )
 
 
 def test_the_free_side_gives_the_load_of_the_hinge_that_holds_the_beam(run: Result) -> None:

@@ -65,17 +65,19 @@ def error(name: str, result: mstmm.Result) -> float:
     return float(np.linalg.norm(result.position("arm.tip") - reference(name), axis=1).max())
 
 
-def near(value: float, expected: float) -> bool:
+def is_near_printed_value(value: float, expected: float) -> bool:
     """Equal as far as an expected value of one or two digits says."""
     return value == pytest.approx(expected, rel=0.17)
 
 
 @pytest.mark.parametrize("name", SCENES)
 def test_ladder(name: str) -> None:
-    assert near(error(name, run(name, 1, "rigid")), RIGID[name])
-    assert near(error(name, run(name, 1, "one-way")), ONE_WAY[name])
-    assert near(error(name, run(name, 1, "coupled", stiffening=False)), LINEAR[name])
-    assert near(error(name, run(name, 1, "coupled")), STIFFENED[name])
+    assert is_near_printed_value(error(name, run(name, 1, "rigid")), RIGID[name])
+    assert is_near_printed_value(error(name, run(name, 1, "one-way")), ONE_WAY[name])
+    assert is_near_printed_value(
+        error(name, run(name, 1, "coupled", stiffening=False)), LINEAR[name]
+    )
+    assert is_near_printed_value(error(name, run(name, 1, "coupled")), STIFFENED[name])
 
 
 @pytest.mark.parametrize("name", SCENES)

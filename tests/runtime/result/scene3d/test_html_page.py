@@ -11,7 +11,7 @@ from PIL import Image
 
 from tests.support.scenes import view as scenes
 from tests.support.view import browser
-from tests.support.view.picture_comparison import blocks, near
+from tests.support.view.picture_comparison import blocks, matches_picture
 
 pytestmark = pytest.mark.skipif(browser.PROGRAM is None, reason="Chromium is not installed")
 
@@ -38,7 +38,7 @@ def test_the_scene_looks_as_it_did(tmp_path: Path) -> None:
         assert page.wait("document.querySelector('#mstmm div').textContent")
         free = (180, 190, 880, 590)  # nothing but the scene is there
         assert page.wait_for_picture(
-            lambda picture: near(blocks(picture, free, (14, 8)), "start.png")
+            lambda picture: matches_picture(blocks(picture, free, (14, 8)), "start.png")
         )
         # A scene that does not move: the same body is in front whenever the browser gets to it.
         assert page.wait(POINT).split("\n")[:2] == ["hub", "mass 2 kg"]

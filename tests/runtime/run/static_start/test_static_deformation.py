@@ -13,7 +13,7 @@ from mstmm.errors import NumericalFailure
 from tests.support.models import looped_model
 from tests.system.loops.test_flexible_against_tree import (
     Scene,
-    hung,
+    hanging_bar,
     meshed_slider_crank,
     opened_tree,
     shackled_beam,
@@ -23,7 +23,7 @@ from tests.system.loops.test_flexible_against_tree import (
 GRAVITY = 9.81
 
 
-def still(scene: Scene, *names: str, **more: Any) -> Scene:
+def set_static_start(scene: Scene, *names: str, **more: Any) -> Scene:
     """The scene with the static start for the bodies of some names, or all that bend."""
     for body in (*scene.get("beam", ()), *scene.get("elastic", ())):
         if not names or body["name"] in names:
@@ -45,7 +45,7 @@ def test_beams_on_two_supports_sag(last: str, sag: float) -> None:
         {"name": "end", "type": last, "inboard": "b.tip", "outboard": "cart"},
     ]  # fmt: skip
     scene = {"gravity": [0, -GRAVITY, 0], "body": [cart], "beam": [beam], "hinge": hinges}
-    model = looped_model(still(scene))
+    model = looped_model(set_static_start(scene))
     seen = model.simulate(0.05, output_times=[0.0, 0.05])
     height = seen.position("b.mid")[:, 1]
     assert height[0] == pytest.approx(-sag * GRAVITY / bending, rel=2e-3)
@@ -59,7 +59,7 @@ def test_a_run_that_damping_settles() -> None:
     scene["hinge"][0]["drive"] = "0.6"
     scene["beam"][0]["damping"] = 0.7
     settled = looped_model(scene).simulate(0.4, rtol=1e-10, output_times=[0.4])
-    q, u = looped_model(still(scene)).initial_state()
+    q, u = looped_model(set_static_start(scene)).initial_state()
     assert not u.any()
     np.testing.assert_allclose(q, settled.q[-1], rtol=0, atol=1e-9)
     assert np.abs(q[-2:]).max() > 1e-5
@@ -67,7 +67,7 @@ def test_a_run_that_damping_settles() -> None:
 
 SCENES = {"slider_crank": (slider_crank, ("bar.tip", "slider"), 2, [0]),
           "shackled": (shackled_beam, ("bar.tip", "far.tip"), 2, [0]),
-          "hung": (hung, ("right.tip", "bar.tip"), 3, [0, 1, 2, 3, 5])}  # fmt: skip
+          "hung": (hanging_bar, ("right.tip", "bar.tip"), 3, [0, 1, 2, 3, 5])}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -75,7 +75,7 @@ def test_forces_that_close_the_loop_hold_the_shapes(name: str) -> None:
     """The open tree needs efforts in as many hinges as the mechanism has freedoms with its shapes
     held, and nowhere else."""
     made, ends, rows, held = SCENES[name]
-    scene = still(made())
+    scene = set_static_start(made())
     for hinge in scene["hinge"]:
         hinge.get("initial", {}).pop("u", None)
     model = looped_model(scene)
@@ -104,11 +104,11 @@ def test_forces_that_close_the_loop_hold_the_shapes(name: str) -> None:
 
 def test_a_crank_that_turns_stretches_and_bends_the_rod() -> None:
     """No shape moves or accelerates while the crank keeps its 8 rad/s."""
-    scene = still(slider_crank())
+    scene = set_static_start(slider_crank())
     q, u = looped_model(scene).initial_state()
     at_rest = slider_crank()
     at_rest["hinge"][0]["initial"].pop("u")
-    bent = looped_model(still(at_rest)).initial_state()[0]
+    bent = looped_model(set_static_start(at_rest)).initial_state()[0]
     assert abs(u[0] - 8.0) < 1e-12 and not u[-2:].any()
     assert np.abs(q - bent)[-2:].max() > 0.3 * np.abs(bent[-2:]).max()
     scene["hinge"][0]["drive"] = "0.6 + 8*t"
@@ -121,10 +121,10 @@ def test_a_crank_that_turns_stretches_and_bends_the_rod() -> None:
 
 
 def test_given_shapes_and_held_hinges_stay() -> None:
-    scene = hung()
+    scene = hanging_bar()
     scene["beam"][0]["initial"] = {"eta": [0.01, 0.0, -0.004, 0.0]}
     scene["hinge"][2] |= {"hold": True, "initial": {"q": [0.02, -0.03]}}
-    model = looped_model(still(scene, "right"))
+    model = looped_model(set_static_start(scene, "right"))
     q, u = model.initial_state()
     assert model.loop_start is not None
     first, layout = model.loop_start.start[0], model.coordinate_layout
@@ -138,7 +138,7 @@ def test_given_shapes_and_held_hinges_stay() -> None:
 
 
 def test_a_mesh_starts_bent_too() -> None:
-    model = looped_model(still(meshed_slider_crank()))
+    model = looped_model(set_static_start(meshed_slider_crank()))
     q, _ = model.initial_state()
     assert model.loop_start is not None
     moved = model.coordinate_layout.modal["bar"].q_slice
@@ -146,7 +146,7 @@ def test_a_mesh_starts_bent_too() -> None:
 
 
 def test_what_is_too_soft_is_told() -> None:
-    scene = still(slider_crank(stiffness=0.01))
+    scene = set_static_start(slider_crank(stiffness=0.01))
     scene["hinge"][0]["initial"].pop("u")
     with pytest.raises(NumericalFailure, match='"bar": no static deformation found'):
         looped_model(scene).initial_state()
