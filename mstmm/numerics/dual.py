@@ -14,13 +14,20 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from .symbolic_number import Formula, apply_function, formula, sum_with_value, vector_length
+from .symbolic_number import (
+    Formula,
+    OrderedByValue,
+    apply_function,
+    formula,
+    sum_with_value,
+    vector_length,
+)
 
 #: Derivatives by parameter number; exact zeros are omitted.
 Derivatives = Mapping[int, float]
 
 
-class Dual:
+class Dual(OrderedByValue):
     """Number `value` with its derivatives slope[k] = d value / d parameter k.
 
     Ordered by value.  A Dual equals a float only where every derivative is zero, so that a zero
@@ -43,18 +50,6 @@ class Dual:
 
     def __hash__(self) -> int:
         return hash(self.value)
-
-    def __lt__(self, other: Any) -> bool:
-        return self.value < value_of(other)
-
-    def __le__(self, other: Any) -> bool:
-        return self.value <= value_of(other)
-
-    def __gt__(self, other: Any) -> bool:
-        return self.value > value_of(other)
-
-    def __ge__(self, other: Any) -> bool:
-        return self.value >= value_of(other)
 
     def __neg__(self) -> Dual:
         return Dual(-self.value, {k: -s for k, s in self.slope.items()})

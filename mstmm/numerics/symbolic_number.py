@@ -84,7 +84,26 @@ class SymbolTable:
             )
 
 
-class Formula:
+class OrderedByValue:
+    """Number whose order is that of its `value`."""
+
+    __slots__ = ()
+    value: float
+
+    def __lt__(self, other: Any) -> bool:
+        return self.value < value_of(other)
+
+    def __le__(self, other: Any) -> bool:
+        return self.value <= value_of(other)
+
+    def __gt__(self, other: Any) -> bool:
+        return self.value > value_of(other)
+
+    def __ge__(self, other: Any) -> bool:
+        return self.value >= value_of(other)
+
+
+class Formula(OrderedByValue):
     """Number `value` with the terms of the polynomial that gives it.
 
     Ordered by value.  A Formula equals a float only where it contains no symbol, so that a formula
@@ -111,18 +130,6 @@ class Formula:
 
     def __hash__(self) -> int:
         return hash(self.value)
-
-    def __lt__(self, other: Any) -> bool:
-        return self.value < value_of(other)
-
-    def __le__(self, other: Any) -> bool:
-        return self.value <= value_of(other)
-
-    def __gt__(self, other: Any) -> bool:
-        return self.value > value_of(other)
-
-    def __ge__(self, other: Any) -> bool:
-        return self.value >= value_of(other)
 
     def __neg__(self) -> Formula:
         return Formula(-self.value, _scale(self.terms, -1))

@@ -90,12 +90,8 @@ _QUARTER_SINE = (0.0, 1.0, 0.0, -1.0)
 
 
 @dataclass(frozen=True)
-class Eigenfunction:
-    """Bending eigenfunction of a uniform beam on start <= x <= end (m), zero outside.
-
-    `kind` is "clamped-free" (clamped at `start`, or at `end` if `mirrored`), "free-free",
-    "clamped-clamped" or "simply-supported".
-    """
+class _Eigenfunction:
+    """Eigenfunction on start <= x <= end (m), zero outside, over xi = 0..1 from its fixed end."""
 
     kind: str
     number: int
@@ -107,6 +103,25 @@ class Eigenfunction:
     @property
     def breaks(self) -> tuple[float, ...]:
         return (self.start, self.end)
+
+    def _locate(self, x: Array) -> tuple[float, Array, NDArray[np.bool_]]:
+        """Length of the span, xi in 0..1, and whether x belongs to the span."""
+        span = self.end - self.start
+        xi = ((self.end - x) if self.mirrored else (x - self.start)) / span
+        inside = (x >= self.start) & ((x <= self.end) if self.closed else (x < self.end))
+        return span, np.clip(xi, 0.0, 1.0), inside
+
+    def _sign(self, d: int) -> float:
+        """Sign of a derivative of order d by x relative to xi."""
+        return -1.0 if self.mirrored and d % 2 else 1.0
+
+
+class Eigenfunction(_Eigenfunction):
+    """Bending eigenfunction of a uniform beam on start <= x <= end (m), zero outside.
+
+    `kind` is "clamped-free" (clamped at `start`, or at `end` if `mirrored`), "free-free",
+    "clamped-clamped" or "simply-supported".
+    """
 
     @property
     def density(self) -> float:
@@ -120,11 +135,8 @@ class Eigenfunction:
         return wave_number(self.kind, self.number)
 
     def __call__(self, x: Array, d: int = 0) -> Array:
-        span = self.end - self.start
-        xi = ((self.end - x) if self.mirrored else (x - self.start)) / span
-        scale = (-1.0 if self.mirrored and d % 2 else 1.0) / span**d
-        inside = _is_inside(x, self.start, self.end, self.closed)
-        return np.where(inside, scale * self._unit(np.clip(xi, 0.0, 1.0), d), 0.0)
+        span, xi, inside = self._locate(x)
+        return np.where(inside, self._sign(d) / span**d * self._unit(xi, d), 0.0)
 
     def _unit(self, xi: Array, d: int) -> Array:
         if self.kind == "simply-supported":
@@ -142,28 +154,12 @@ def _wave(angle: Array, d: int, cosine: float, sine: float) -> Array:
     return (cosine * c + sine * s) * np.cos(angle) + (sine * c - cosine * s) * np.sin(angle)
 
 
-def _is_inside(x: Array, start: float, end: float, closed: bool) -> NDArray[np.bool_]:
-    return (x >= start) & ((x <= end) if closed else (x < end))
-
-
-@dataclass(frozen=True)
-class Sine:
+class Sine(_Eigenfunction):
     """Eigenfunction of a uniform rod on start <= x <= end (m): sqrt2 sin or cos, zero outside.
 
     `kind`: "fixed-free" sin((k - 1/2) pi xi) (fixed at `end` if `mirrored`), "free-free"
     cos(k pi xi), "fixed-fixed" sin(k pi xi).
     """
-
-    kind: str
-    number: int
-    start: float
-    end: float
-    mirrored: bool = False
-    closed: bool = True  #: whether `end` belongs to the span
-
-    @property
-    def breaks(self) -> tuple[float, ...]:
-        return (self.start, self.end)
 
     @property
     def density(self) -> float:
@@ -175,12 +171,10 @@ class Sine:
         return (self.number - 0.5 * (self.kind == "fixed-free")) * math.pi
 
     def __call__(self, x: Array, d: int = 0) -> Array:
-        span = self.end - self.start
-        xi = ((self.end - x) if self.mirrored else (x - self.start)) / span
-        scale = (-1.0 if self.mirrored and d % 2 else 1.0) * _SQRT2 * (self.beta / span) ** d
+        span, xi, inside = self._locate(x)
+        scale = self._sign(d) * _SQRT2 * (self.beta / span) ** d
         wave = (1.0, 0.0) if self.kind == "free-free" else (0.0, 1.0)
-        inside = _is_inside(x, self.start, self.end, self.closed)
-        return np.where(inside, scale * _wave(self.beta * np.clip(xi, 0.0, 1.0), d, *wave), 0.0)
+        return np.where(inside, scale * _wave(self.beta * xi, d, *wave), 0.0)
 
 
 class Piecewise:

@@ -120,21 +120,15 @@ class LaterStates:
 
 def equations_at(linear: LinearEquations, state: State) -> LinearEquations:
     """Linear equations at another state of the same motion."""
-    loops = linear.constrained_motion
+    loops, transform = linear.constrained_motion, linear.frame_transform
     loops = None if loops is None else loops.at_state(state)
-    turning, carrying = (
-        linear.rate_matrix if loops is None else loops.rate_matrix,
-        linear.frame_transform,
-    )
-    if carrying is not None:
-        carrying = carrying.advance(state.t - linear.state.t)
     return replace(
         linear,
         state=state,
         compiled_state=None,
         constrained_motion=loops,
-        rate_matrix=turning,
-        frame_transform=carrying,
+        rate_matrix=linear.rate_matrix if loops is None else loops.rate_matrix,
+        frame_transform=None if transform is None else transform.advance(state.t - linear.state.t),
     )
 
 

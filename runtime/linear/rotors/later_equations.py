@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +11,7 @@ from mstmm.array_validation import Array
 from ...engine.state_evaluation.steady_motion import move_steadily
 from ...run.scene_system import SceneSystem
 from ..mck_matrices import State
+from ..operating_point.later_states import equations_at
 
 if TYPE_CHECKING:
     from ..linear_equations import LinearEquations
@@ -24,20 +24,7 @@ _AHEAD = 0.1
 
 def later(linear: LinearEquations) -> LinearEquations:
     """Linear equations at the later state of the motion."""
-    state, loops = later_state(linear), linear.constrained_motion
-    loops = None if loops is None else loops.at_state(state)
-    turning = linear.rate_matrix if loops is None else loops.rate_matrix
-    carrying = linear.frame_transform
-    if carrying is not None:
-        carrying = carrying.advance(state.t - linear.state.t)
-    return replace(
-        linear,
-        state=state,
-        compiled_state=None,
-        constrained_motion=loops,
-        rate_matrix=turning,
-        frame_transform=carrying,
-    )
+    return equations_at(linear, later_state(linear))
 
 
 def later_state(linear: LinearEquations) -> State:
