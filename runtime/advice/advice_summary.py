@@ -1,31 +1,33 @@
-"""Build the advice from the results of the search: each choice with its reason, and savings."""
+"""Build the advice from the results of the search: choices with reasons, savings, outputs."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from mstmm.defaults import METHOD, RTOL
 from mstmm.safe_text import abbreviate_names
+from mstmm.scene import Scene
 
 from ..chart.chart_points import Point, Setting
+from ..chart.model_levels import with_tables
 from ..chart.trial_run import max_error
 from ..integrate.steppers import AUTO
 from .advice import Advice, BodyAdvice, TriedModel
 from .advice_state import AdviceState
-from .body_model_levels import RIGID, BodyModel, given_body_model
+from .body_model_levels import LINEAR, ONE_WAY, RIGID, STIFFENED, BodyModel, given_body_model
 from .error_predictors import ErrorPrediction
 from .full_run_settings import whole_run_tolerance
 from .method_selection import SelectedSetting, compare_cpu_times
-from .reason_text import choice_reason
-from .reduced_outputs import with_available_outputs
 from .search import Choices, ModelSearch
 
 if TYPE_CHECKING:
     from mstmm.scene.tables.beam import Beam
     from mstmm.scene.tables.elastic import Elastic
+
+    from ..model.model import Model
 
 #: Name of the given scene among the models tried.
 AS_GIVEN = "as given"
@@ -156,7 +158,7 @@ def _body_advice(
         split = state.split_error or prediction.frame_error * state.error_per_metre
     is_part = name in state.parts
     richest = richest_choices.get(name, choice) if is_part else state.unsplit_models[name]
-    reason = choice_reason(choice, richest, prediction, state.error_per_metre, state.request.error)
+    reason = _choice_reason(choice, richest, prediction, state.error_per_metre, state.request.error)
     if split is not None and prediction is not None:
         reason += f"; its slope is {prediction.slope:.2g}, for which one floating frame "
         reason += (
@@ -209,3 +211,67 @@ def _savings(state: AdviceState, selected: SelectedSetting) -> tuple[float | Non
             saving = None if times is None else times[0] / times[1]
         savings.append(saving)
     return savings[0], savings[1]
+
+
+def with_available_outputs(scene: Scene, compile: Callable[[Scene], Model]) -> Scene:
+    """The scene without the outputs that its results cannot provide."""
+    if not scene.output:
+        return scene
+    available = compile(scene).simulate(0.0, "dop853").outputs()
+    return with_tables(
+        scene, output=tuple(output for output in scene.output if output.name in available)
+    )
+
+
+# --- reasons --------------------------------------------------------------------------------------
+
+
+def _choice_reason(
+    choice: BodyModel,
+    richest: BodyModel,
+    prediction: ErrorPrediction | None,
+    in_measure: float,
+    target_error: float,
+) -> str:
+    """Reason why a model suffices and no smaller one does.
+
+    `in_measure` is the factor from m to the unit of errors.
+    """
+    if prediction is None:
+        return "found by trial runs, without error estimates"
+    deflects = f"it deflects by {prediction.deflection * in_measure:.1e}"
+    if not prediction.deflection > 0:
+        deflects = "its ends do not move in its floating frame"
+    if choice.level == RIGID:
+        omitted = ", about the error of a rigid body" if prediction.deflection > 0 else ""
+        return f"{deflects}{omitted}"
+    if choice.level == ONE_WAY:
+        return (
+            f"{deflects}; its reaction on the motion is small (chi {prediction.coupling:.2g}, "
+            f"gamma {prediction.load_ratio:.1e})"
+        )
+    parts = [deflects, _stiffening_text(choice, prediction, in_measure, target_error)]
+    omitted_shapes = sorted(name for name in prediction.by_shape if not choice.keeps_shape(name))
+    if omitted_shapes:
+        deflection = sum(prediction.by_shape[name] for name in omitted_shapes) * in_measure
+        parts.append(
+            f"the shapes left out ({', '.join(omitted_shapes)}) deflect it by {deflection:.1e}"
+        )
+    elif choice.shapes != richest.shapes:
+        parts.append("fewer shapes suffice in trial runs")
+    return "; ".join(parts)
+
+
+def _stiffening_text(
+    choice: BodyModel, prediction: ErrorPrediction, in_measure: float, target_error: float
+) -> str:
+    """Change of the stiffness by loads, and whether the model includes it."""
+    effect = prediction.deflection * prediction.load_ratio * in_measure
+    text = (
+        f"its loads change its stiffness by gamma {prediction.load_ratio:.1e}, an effect of "
+        f"{effect:.1e}"
+    )
+    if choice.level == LINEAR:
+        return f"{text}, which linear kinematics neglect"
+    needed = choice.level == STIFFENED and (effect > target_error or prediction.stiffens)
+    return f"{text}, which stiffening includes" + ("" if needed else " at no cost")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from math import hypot
 
 import numpy as np
@@ -12,15 +12,16 @@ from mstmm.errors import SceneError
 
 from ..engine.looped_engine import LoopedEngine
 from ..kernels.c_records import CRecords
+from ..packing.packed_scene import PackedScene
 from .body_parts import Part
 from .integration_schemes import Scheme
 from .planar_and_spatial import MOTION, Form
-from .product_chains import check_product_chains
+from .supported_elements import BALL, ELASTIC_BALL, ELASTIC_PIN, PIN
 
 #: Corrections at which iterations end, and position gaps at which a step fails, relative to the
 #: size of the scene or in rad; loads that the product may leave at a free tip, relative to the
 #: largest load.
-MAX_CORRECTION, MAX_POSITION_GAP, MAX_TIP_LOAD = 1e-10, 1e-2, 1e-6
+_MAX_CORRECTION, _MAX_POSITION_GAP, _MAX_TIP_LOAD = 1e-10, 1e-2, 1e-6
 
 
 class Stepper:
@@ -35,7 +36,7 @@ class Stepper:
     ) -> None:  # fmt: skip
         ffi, lib = engine.ffi, engine.lib
         if product and not form.planar:
-            check_product_chains(engine.packed, parts)
+            _check_product_chains(engine.packed, parts)
         self.lib, self.ffi, self.count = lib, ffi, len(parts)
         self._bodies = CRecords(ffi, "mstmm_classical_body", self.count)
         for k, part in enumerate(parts):
@@ -55,7 +56,7 @@ class Stepper:
         for name in ("alpha_m", "alpha_f", "beta", "gamma", "theta"):
             setattr(run.scheme, name, getattr(scheme, name))
         run.size = scene_size(parts)
-        run.tolerance, run.gap, run.accuracy = MAX_CORRECTION, MAX_POSITION_GAP, MAX_TIP_LOAD
+        run.tolerance, run.gap, run.accuracy = _MAX_CORRECTION, _MAX_POSITION_GAP, _MAX_TIP_LOAD
         run.motions = ffi.from_buffer("mstmm_classical_motion[]", self.motions)
         run.work = ffi.from_buffer("char[]", self._work)
 
@@ -91,3 +92,42 @@ def scene_size(parts: Sequence[Part]) -> float:
     if not np.isfinite(size):
         raise SceneError("the size of the scene is not finite")
     return size
+
+
+# --- chains of the plain product ------------------------------------------------------------------
+
+#: Kind of a hinge -> type of its free rotation.
+_ROTATION_TYPES = {PIN: "pin", ELASTIC_PIN: "pin", BALL: "ball", ELASTIC_BALL: "ball"}
+
+
+def _check_product_chains(packed: PackedScene, parts: Sequence[Part]) -> None:
+    """Raise SceneError for spatial chains whose free rotations the plain product cannot eliminate.
+
+    The free rotation of a hinge is eliminated by the condition of the next hinge outboard, so both
+    must be of the same type.  In the plane they always are.
+    """
+    for place, previous in _successive_free_rotations(parts):
+        needed_type = _ROTATION_TYPES[parts[previous].kind]
+        if _ROTATION_TYPES[parts[place].kind] != needed_type:
+            link = packed.topology.links[parts[place].hinge]
+            raise SceneError(
+                f'hinge "{packed.scene.hinges.name(link.hinge)}": outboard of a hinge that rotates '
+                f"as a {needed_type} the plain product needs another of that kind; use method "
+                "dttmm-classical"
+            )
+
+
+def _successive_free_rotations(parts: Sequence[Part]) -> Iterator[tuple[int, int]]:
+    """Pairs (place, place of the previous hinge with free rotation) along first children."""
+    previous_in_branch: dict[int, int] = {}
+    parents_with_child: set[int] = set()
+    for place, part in enumerate(parts):
+        parent = part.parent
+        is_first_child = parent >= 0 and parent not in parents_with_child
+        parents_with_child.add(parent)
+        previous = previous_in_branch.get(parent, -1) if is_first_child else -1
+        if part.kind in _ROTATION_TYPES:
+            if previous >= 0:
+                yield place, previous
+            previous = place
+        previous_in_branch[place] = previous

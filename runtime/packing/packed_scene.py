@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -11,14 +12,16 @@ from mstmm.numerics.piecewise_polynomial import NUMBERS_PER_PIECE, PiecewisePoly
 
 from ..discontinuities.active_expressions import active_expressions
 from ..discontinuities.time_map import TimeMap, time_map
-from .records.expression_derivatives import LOCK, Slopes, write_slopes
-from .records.model_record import Written
+from .records.model_record import Slopes, Written, write_slopes
 from .scene_frames import Frames
 from .switch_margins import EventFunctions, event_order
 from .system import System
 
 #: Largest number of cached time maps.
 _MAX_TIME_MAPS = 8
+
+#: Guards the compilation of derivative tapes, which several threads may request.
+_SLOPES_LOCK = threading.Lock()
 
 
 @dataclass
@@ -80,7 +83,7 @@ class PackedScene(Frames):
 
     def slopes(self) -> Slopes:
         """Derivative tapes of the scene's expressions; the first call adds them to the records."""
-        with LOCK:
+        with _SLOPES_LOCK:
             if self._slopes is None:
                 self._slopes = write_slopes(self.system, self.model, self.ffi)
             return self._slopes

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 from mstmm.expression.expression import Expression
 from mstmm.expression.inputs import Inputs
 from mstmm.ir import Port
-from mstmm.scene import Scene, split_reference
+from mstmm.ir.hinge_properties import builtin_hinges
+from mstmm.ir.param import Param
+from mstmm.scene import Hinge, Scene, split_reference
 from mstmm.scene.checks.topology import Topology, build_topology
 from mstmm.scene.tables.hinge import HingeTable
 from mstmm.scene.tables.loads import Load
@@ -19,9 +21,10 @@ from ..discontinuities.active_expressions import active_expressions
 from ..flexible.modal_body import ModalBody
 from ..kernels.c_records import Lookup
 from .bodies import Bodies
+from .coordinate_layout import Group, HingeSlots, Layout
 from .expression_tapes import MOVING, Values, drive_kernel
 from .flexible.expansion import ExpandedScene, expand
-from .force_elements.collection import force_element_numbers
+from .force_elements import force_element_numbers
 from .hinge_laws import law_runs
 from .hinge_release import releasable_hinges
 from .loops.closures import closure_numbers
@@ -33,8 +36,7 @@ from .merging import link_detection
 from .merging.right_angle_snapping import with_right_angles
 from .merging.simplification import LINKED, LINKS, TURNS, WELDS, Simplification, SimplifyOptions
 from .merging.welded_bodies import WeldedBodies, contract_tree, find_welded_bodies
-from .node_layout import build_layout
-from .scene_elements import Elements, Known
+from .scene_elements import LETS_GO, Elements, Known, kernel_type
 from .scene_frames import Frames
 from .system import HeldInputs, LoadNumbers, Numbers, System
 
@@ -86,7 +88,7 @@ def system_of(
     carried = find_welded_bodies(expanded, tree) if WELDS in simplify else WeldedBodies()
     tree = contract_tree(tree, carried)
     releases = {name: i for i, name in enumerate(releasable_hinges(scene))}
-    layout = build_layout(expanded, releases, elements)
+    layout = _build_layout(expanded, releases, elements)
     bodies = Bodies(expanded, tree, layout, elements, releases, align, LINKS in simplify, carried)
     runs = tuple(map(bodies.run, tree.runs))
     if not may_have_loops(scene):
@@ -189,3 +191,57 @@ def _section_axes(frames: Frames, reference: str) -> Numbers:
     node = frames.expanded.nodes.get(reference)
     passage = frames.expanded.passages.get(node or "")
     return () if passage is None else tuple(passage.port.rotation.T.ravel().tolist())
+
+
+# --- layout of q and u ----------------------------------------------------------------------------
+
+
+def _build_layout(
+    expanded: ExpandedScene, releases: Mapping[str, int], elements: Elements
+) -> Layout:
+    """Build the layout of q and u: the scene's hinges, those of its chains, then the modes."""
+    scene = expanded.scene
+    groups: list[Group] = []
+    q = u = 0
+    starts = [*range(len(scene.hinge)), *scene.hinges.starts[:-1]]
+    counts = [1] * len(scene.hinge) + [chain.count for chain in scene.chain]
+    patterns = [1] * len(scene.hinge) + [len(chain.hinge) for chain in scene.chain]
+    for first, count, pattern in zip(starts, counts, patterns, strict=True):
+        slots, nq, nu = [], 0, 0
+        for hinge in scene.hinges[first : first + pattern]:
+            slots.append(_hinge_slots(hinge, releases, elements, q + nq, u + nu))
+            nq, nu = nq + slots[-1].nq, nu + slots[-1].nu
+        groups.append(Group(first, count, tuple(slots), nq, nu))
+        repeats, rest = divmod(count, pattern)
+        q += repeats * nq + sum(s.nq for s in slots[:rest])
+        u += repeats * nu + sum(s.nu for s in slots[:rest])
+    modal = {}
+    for name, body in expanded.bodies.items():
+        n = len(body.modes)
+        units = tuple("rad" if mode.startswith("twist") else "m" for mode in body.modes)
+        rates = tuple(f"{unit}/s" for unit in units)
+        speeds = tuple(f"{mode}_rate" for mode in body.modes)
+        modal[name] = HingeSlots(
+            name, "modes", q, u, body.modes, units, speeds, rates, None, True, True, False
+        )  # fmt: skip
+        q, u = q + n, u + n
+    internal = range(len(expanded.user_scene.hinge), len(scene.hinge))
+    return Layout(scene, tuple(groups), q, u, modal, internal, expanded.user_scene.channels)
+
+
+def _hinge_slots(
+    hinge: Hinge, releases: Mapping[str, int], elements: Elements, q: int, u: int
+) -> HingeSlots:
+    runs_as = kernel_type(hinge, releases)
+    elements.get("hinge", runs_as, hinge.name)
+    facts = builtin_hinges()[LETS_GO] if hinge.is_weld and runs_as == LETS_GO else hinge.facts
+    assert facts is not None  # `get` has rejected unknown types
+    return HingeSlots(
+        hinge.name, hinge.type, q, u, *_names_and_units(facts.coordinates),
+        *_names_and_units(facts.speeds), facts.quaternion, facts.straight, facts.constant_subspace,
+        facts.constant_subspace and not facts.slides,
+    )  # fmt: skip
+
+
+def _names_and_units(entries: Sequence[Param]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    return tuple(entry.name for entry in entries), tuple(entry.unit for entry in entries)

@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from math import ceil
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,7 +20,6 @@ from mstmm.errors import NumericalFailure, SceneError
 
 from ..classical.body_parts import Part, build_parts
 from ..classical.c_records import Stepper, scene_size
-from ..classical.failures import failure_message
 from ..classical.integration_schemes import parse_scheme
 from ..classical.planar_and_spatial import Form, PartMovement, select_form
 from ..classical.state_conversion import StateConversion, start_movements
@@ -267,7 +266,7 @@ class _Run:
         hinge = self.parts[int(run.element)].hinge
         hinge_text = f'hinge "{engine.hinge_name(hinge)}"'
         body_text = f'body "{self._body_name(hinge)}"'
-        cause, remedy = failure_message(lib, int(run.failure), hinge_text, body_text)
+        cause, remedy = _failure_cause(lib, int(run.failure), hinge_text, body_text)
         not_finite = run.failure == lib.MSTMM_CLASSICAL_NOT_FINITE
         text = f"{cause}, in the step from t = {self.t:.9g} s on; {remedy}"
         return Status.NOT_FINITE if not_finite else Status.RHS_FAILED, text
@@ -279,12 +278,40 @@ class _Run:
         memory = np.concatenate([np.zeros((0, len(self.memory))), *buffer.memory])[:, :n_memory]
         samples = Samples(t, y, memory, np.zeros(len(t), dtype=np.int64))
         step = self.settings.step if self.step_count > 1 else None
+        solutions = int(self.stepper.run.solutions) if hasattr(self, "stepper") else 0
         statistics = Statistics(
-            self.steps, 0, self._solution_count(), 0, step, step, None, None, 0.0, 0.0, False, 0
+            self.steps, 0, solutions, 0, step, step, None, None, 0.0, 0.0, False, 0
         )
         return split(
             self.system, samples, self.settings, status, message, statistics, (self.t, self.last)
         )
 
-    def _solution_count(self) -> int:
-        return int(self.stepper.run.solutions) if hasattr(self, "stepper") else 0
+
+def _failure_cause(lib: Any, failure: int, hinge: str, body: str) -> tuple[str, str]:
+    """Cause and remedy of a failed step; `hinge` and `body` name the failing element."""
+    return {
+        lib.MSTMM_CLASSICAL_SINGULAR: (
+            f"{hinge}: its motion is undetermined", "give the outboard bodies mass and inertia",
+        ),
+        lib.MSTMM_CLASSICAL_LOST: (
+            f"the product of transfer matrices is lost to rounding: loads remain at the free end "
+            f"of {body} (errors grow geometrically along a chain)",
+            "use method dttmm-classical",
+        ),
+        lib.MSTMM_CLASSICAL_OPEN: (
+            f"{hinge} has a position gap: constraint loads at position level oscillate and grow "
+            "with an undamped scheme or a long step",
+            "use generalised-alpha or a shorter step",
+        ),
+        lib.MSTMM_CLASSICAL_UNSETTLED: (
+            "the iterations of a step do not converge", "use a shorter step"
+        ),
+        lib.MSTMM_CLASSICAL_FAR: (
+            f"one linear solution moves {body} by more than the size of the scene, because the "
+            "steps do not resolve a fast motion",
+            "use iterations, a damped scheme or a shorter step",
+        ),
+        lib.MSTMM_CLASSICAL_NOT_FINITE: (
+            f"the motion of {body} is not finite", "use a shorter step or a damped scheme"
+        ),
+    }[failure]  # fmt: skip

@@ -1,17 +1,25 @@
-"""Integrals over a beam: generated integrands, Gauss quadrature along its pieces."""
+"""Mass, drag and stiffness of a beam: integrals of generated integrands, or lumped mass.
+
+Both use Gauss quadrature along the pieces of the beam.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 
 from mstmm.array_validation import Array
+from mstmm.errors import SceneError
 
 from ..mass_moments import Moments
+from ..modal_port import MassPoint
 from . import beam_kernels
+from .gauss_quadrature import gauss_rule
 from .multilinear import Row, Term, Terms, add_products, kernel_terms, known_factor, shape_rows
 from .section_ports import BeamShapes, without_noise
+from .shape_fields import DIRECTIONS
 
 
 def mass_moments(shapes: BeamShapes) -> Moments:
@@ -156,3 +164,44 @@ def _from_upper_triangle(upper: Array) -> Array:
     full = np.zeros((3, 3))
     full[np.triu_indices(3)] = upper
     return full + np.triu(full, 1).T
+
+
+# --- lumped mass (quadrature) ---------------------------------------------------------------------
+
+#: Largest count of second-order coefficients at all mass points: a quarter of a gigabyte, which
+#: every evaluation of the accelerations reads.
+_MAX_COEFFICIENTS = 2**25
+
+
+def mass_points(shapes: BeamShapes) -> tuple[MassPoint, ...]:
+    """Mass points of a beam, at Gauss points.
+
+    There are 3 n + 4 for n shapes in the direction with the most, distributed by length over the
+    pieces between section changes and ends.  Raises SceneError where they need too much memory.
+    """
+    x, lengths = _mass_slices(shapes)
+    count = 6 * shapes.n**2 * len(x)
+    if count > _MAX_COEFFICIENTS:
+        raise SceneError(
+            f'beam "{shapes.data.name}": {shapes.n} shapes need {len(x)} mass points (quadrature) '
+            f"and {8e-6 * count:.0f} MB of second-order coefficients; expected "
+            f"{8e-6 * _MAX_COEFFICIENTS:.0f} MB or less; give fewer shapes"
+        )
+    mass, yy, zz = shapes.data.inertia[:, shapes.data.piece(x)] * lengths
+    inertia = [np.diag(diagonal) for diagonal in np.stack([yy + zz, zz, yy], axis=1)]
+    return tuple(
+        MassPoint(float(m), tensor, port)
+        for m, tensor, port in zip(mass, inertia, shapes.ports(x), strict=True)
+    )
+
+
+def _mass_slices(shapes: BeamShapes) -> tuple[Array, Array]:
+    """Positions of the mass points and lengths of their slices, m."""
+    n = max((sum(m.direction == d for m in shapes.modes) for d in DIRECTIONS), default=0)
+    positions, lengths = [], []
+    places = sorted({*shapes.breaks, *(x for x, _ in shapes.data.ends.values())})
+    for a, b in pairwise(places):
+        nodes, weights = gauss_rule(max(4, int(np.ceil((3 * n + 4) * (b - a) / shapes.length))))
+        positions.append(a + (b - a) * nodes)
+        lengths.append((b - a) * weights)
+    return np.concatenate(positions), np.concatenate(lengths)

@@ -27,10 +27,9 @@ from .automatic_choices import (
     missing_static_shapes,
 )
 from .beam_data import BeamData, beam_data
-from .beam_integrals import drag_moments, mass_moments, stiffness
+from .beam_integrals import drag_moments, mass_moments, mass_points, stiffness
 from .boundary_conditions import BeamEnvironment, BoundaryConditions, boundary_conditions
 from .frame_conditions import modes_in_frame
-from .lumped_mass import mass_points
 from .planar_motion import PlanarMotionCheck
 from .section_ports import BeamShapes
 from .shape_bases import basis_shapes

@@ -26,8 +26,7 @@ from ...run import external_integrators
 from ...run.method_switching import implicit_method
 from ...run.spectral_radius import fastest_possible
 from .error_extrapolation import Kind
-from .initial_vibration import Vibration, initial_vibration
-from .struck_beam import starts_vibrating
+from .initial_vibration import Vibration, initial_vibration, starts_vibrating
 
 if TYPE_CHECKING:
     from ...engine.compiled_scene import CompiledScene

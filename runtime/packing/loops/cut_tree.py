@@ -10,10 +10,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from mstmm.scene import Body, Constraint, End, Scene, split_reference
+from mstmm.numerics.rotations import IDENTITY, to_quaternion
+from mstmm.scene import Body, Constraint, End, Hinge, Scene, split_reference
 from mstmm.scene.checks.topology import build_topology
+from mstmm.scene.tables.closures import CURVE
+from mstmm.scene.tables.hinge_frames import axes_about
+from mstmm.scene.validators.scalars_and_vectors import GROUND
 
-from .constraint_frames import frame_hinge
+from ..coordinate_layout import OF_CONSTRAINT
+from .curve_constraints import curve_hinge
 from .loop_detection import may_have_loops
 
 
@@ -56,13 +61,30 @@ def cut_loops(scene: Scene) -> tuple[Scene, tuple[Cut, ...]]:
         bodies.append(_frame(cut.frame, ends))
         cuts.append(cut)
     for constraint in scene.constraint:
-        hinge = frame_hinge(constraint)
+        hinge = _frame_hinge(constraint)
         tables.append(hinge)
         bodies.append(_frame(hinge.outboard, {}))
         cuts.append(Cut(hinge.name, hinge.outboard, split_reference(constraint.to)[0], constraint))
     fields = {name: getattr(scene, name) for name in type(scene).model_fields}
     fields |= {"body": tuple(bodies), "hinge": tuple(tables), "constraint": ()}
     return Scene.model_construct(**fields), tuple(cuts)
+
+
+def _frame_hinge(constraint: Constraint) -> Hinge:
+    """Hinge between the end `from` of a constraint and its frame, with a reserved name.
+
+    It is a weld, with z along the normal if there is one; of a point on a curve it moves along it.
+    """
+    name, normal = f"{constraint.name}{OF_CONSTRAINT}", constraint.unit_normal
+    axes = IDENTITY if normal is None else axes_about(normal, None)
+    weld = Hinge(name="frame", type="fixed", inboard=GROUND, outboard="frame",
+                 orientation=to_quaternion(axes))  # fmt: skip
+    on_ground = split_reference(constraint.from_)[0] == GROUND
+    weld = weld.model_copy(update={
+        "name": name, "inboard": constraint.from_, "outboard": f"{name}/frame",
+        "position": constraint.position if on_ground else (0.0, 0.0, 0.0),
+    })  # fmt: skip
+    return curve_hinge(constraint, weld) if constraint.type == CURVE else weld
 
 
 def _frame(name: str, ends: Mapping[str, End]) -> Body:

@@ -1,4 +1,7 @@
-"""C records of bodies; equal bodies share the work: one record is filled and copied."""
+"""C records of bodies, and of the runs of them that the looped engine sweeps as links.
+
+Equal bodies share the work: one record is filled and copied.
+"""
 
 from __future__ import annotations
 
@@ -90,7 +93,7 @@ class BodyRecords:
         link: Numbers = ()
         if link_kernel(body):
             hinge_p = body.hinge_p or (0.0,)  # links always read one
-            link = (*body.body_p, body.rotor[0], *hinge_p, *connection_numbers(body))
+            link = (*body.body_p, body.rotor[0], *hinge_p, *_connection_numbers(body))
         hinge = (*body.connection, 0.0, 0.0, -body.height, *body.rotor, *body.hinge_p)
         own = (*body.body_p, *body.body_frame)
         start = self.memory.reals((*hinge, *own, *link))
@@ -106,7 +109,7 @@ class BodyRecords:
         kind = (body.hinge, body.body, link)
         if kind not in self._kernels_by_kind:
             table = self._kernel_table(body.hinge, body.body, link)
-            table.link_numbers = len(connection_numbers(body))
+            table.link_numbers = len(_connection_numbers(body))
             table.link_angles = int(bool(body.link))
             self._kernels_by_kind[kind] = table
         return self._kernels_by_kind[kind]
@@ -130,7 +133,29 @@ class BodyRecords:
         return table
 
 
-def connection_numbers(body: BodyNumbers) -> Numbers:
+# --- runs of links --------------------------------------------------------------------------------
+
+
+def attach_runs(model: Any, system: System, memory: Memory, lib: Any, place: int) -> int:
+    """Split the bodies into runs and reserve workspace for their links at offset `place`.
+
+    Returns the offset behind them.
+    """
+    ffi, max_count = memory.ffi, max(1, system.count)
+    buffer, numbers = ffi.new("mstmm_branch[]", max_count), memory.new("real *[]", max_count)
+    size, gathered = ffi.new("int64_t *"), ffi.NULL
+    is_link = [bool(link_kernel(body)) for body in system.distinct]
+    if sum(is_link) + (not all(is_link)) > max_count // 4:
+        lengths = system.rows(lambda body: int(lib.MSTMM_LINK_OWN) + len(_connection_numbers(body)))
+        gathered = memory.new("real[]", max(1, int(lengths.sum())))
+    count = lib.mstmm_fill_runs(model, buffer, numbers, gathered, place, size)
+    runs = memory.new("mstmm_branch[]", max(1, count))  # often one run for thousands of bodies
+    ffi.memmove(runs, buffer, count * ffi.sizeof("mstmm_branch"))
+    model.runs, model.n_runs = runs, count
+    return place + int(size[0])
+
+
+def _connection_numbers(body: BodyNumbers) -> Numbers:
     """Transform from the parent in a link: screws, or a rotation and a position."""
     return body.link or body.connection
 

@@ -1,22 +1,28 @@
-"""C record `mstmm_model` of a system."""
+"""C record `mstmm_model` of a system, and the derivative tapes added to it on first use."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from mstmm.array_validation import Integers
+from mstmm.expression.inputs import INPUTS
+from mstmm.ir import KernelIR
+from mstmm.ir.differentiation import differentiate
+from mstmm.ir.tape import compile_tape
 from mstmm.numerics.piecewise_polynomial import PiecewisePolynomial
 
 from ...kernels import prebuilt_kernels
+from ...kernels.c_records import CRecords
+from ...kernels.tape_kernel import c_tape
 from ..load_coupling import LoadDependence, load_coupling
 from ..loops.planarity import motion_plane
 from ..scene_elements import Elements
-from ..system import ForceNumbers, LoadNumbers, System
-from .body_records import BodyRecords
-from .laws import LawRecords
-from .links import attach_runs
+from ..system import ForceNumbers, LawNumbers, LawRun, LoadNumbers, System
+from .body_records import BodyRecords, attach_runs
 from .loops import LoopRecords, attach_loops
 from .memory import Memory
 from .planar_records import attach_planar_bodies
@@ -64,7 +70,7 @@ def write_model(system: System, elements: Elements) -> Written:
         record.body, record.coordinate, record.speed = body, k, k
     model.drives, model.n_drives = drives, len(system.driven)
     model.drive_tape = memory.expression(system.drives)
-    laws = LawRecords(system, memory)
+    laws = _LawRecords(system, memory)
     model.laws, model.n_laws = laws.records.array, laws.records.count
     reach = load_coupling(system)
     for place in reach.own_load_bodies:
@@ -136,3 +142,87 @@ def _fill_force(record: Any, force: ForceNumbers, elements: Elements, memory: Me
     record.wrench_slope = functions.get("wrench_slope", memory.ffi.NULL)
     record.p = memory.reals(force.p)
     record.effort = memory.expression(force.effort)
+
+
+# --- hinge laws -----------------------------------------------------------------------------------
+
+
+class _LawRecords:
+    """Records of the hinge laws, run by run; those of a pattern are filled once and copied."""
+
+    def __init__(self, system: System, memory: Memory) -> None:
+        self.memory, self.functions = memory, prebuilt_kernels.element("sweep", "laws").functions
+        self.records = CRecords(memory.ffi, "mstmm_law", sum(run.count for run in system.laws))
+        memory.keep_alive.append(self.records)
+        first = 0
+        for run in system.laws:
+            self._fill_run(run, first)
+            first += run.count
+
+    def _fill_run(self, run: LawRun, first: int) -> None:
+        if run.count == len(run.pattern):
+            for number, (law, body, twist, efforts) in enumerate(run.iterate_laws(), first):
+                record = self.records.array[number]
+                self._fill(record, law)
+                record.body, record.twist = body, twist
+                record.effort = self.memory.ints(efforts)
+            return
+        prototypes = CRecords(self.memory.ffi, "mstmm_law", len(run.pattern))
+        for record, law in zip(prototypes.array, run.pattern, strict=True):
+            self._fill(record, law)
+        numbers = slice(first, first + run.count)
+        repeats, k_in_pattern = np.divmod(np.arange(run.count), len(run.pattern))
+        self.records.copy(numbers, prototypes, k_in_pattern)
+        member = np.array([law.member for law in run.pattern])[k_in_pattern]
+        turn = np.array([law.turn for law in run.pattern])[k_in_pattern]
+        column = self.records.column
+        column("body")[numbers] = run.position + repeats * run.period + member
+        column("twist")[numbers] = np.where(
+            turn < 0, -1, run.twist + repeats * run.rotation_count + turn
+        )
+        for k, law in enumerate(run.pattern):
+            pointers = column("effort")[numbers][k :: len(run.pattern)]
+            indices = np.array(law.efforts, dtype=np.int32)
+            self.memory.keep_alive.append(indices)
+            pointers[:] = indices.ctypes.data
+            if len(indices) > 1:
+                pointers += indices.strides[0] * np.arange(len(pointers), dtype=pointers.dtype)
+
+    def _fill(self, record: Any, law: LawNumbers) -> None:
+        """Fill the fields that all repeats of a law share."""
+        record.kind, record.evaluate = int(law.turn >= 0), self.functions[law.kernel]
+        record.evaluate_slope = self.functions[f"{law.kernel}_slope"]
+        record.coordinate, record.speed, record.n = law.coordinate, law.speed, law.n
+        record.p, record.axes = self.memory.reals(law.p), self.memory.ffi.NULL
+        if law.axes:
+            record.axes = self.memory.reals(law.axes)
+
+
+# --- derivatives of expressions -------------------------------------------------------------------
+
+
+@dataclass
+class Slopes:
+    """Tapes of derivatives: their largest workspace, and references that keep them alive."""
+
+    slots: int = 0
+    keep_alive: list[Any] = field(default_factory=list)
+
+
+def write_slopes(system: System, model: Any, ffi: Any) -> Slopes:
+    """Write derivative tapes of drives, values, couplings and spring efforts to `model`."""
+    slopes = Slopes()
+
+    def tape(kernel: KernelIR | None) -> Any:
+        if kernel is None:
+            return ffi.NULL
+        ports = [port.name for port in kernel.inputs if port.name != INPUTS]
+        slope = compile_tape(differentiate(kernel, ports, values=False, guards=False))
+        slopes.slots = max(slopes.slots, slope.slots)
+        return c_tape(ffi, slope, slopes.keep_alive)
+
+    model.drive_slopes, model.value_slopes = tape(system.drives), tape(system.values)
+    model.coupling_slopes = tape(system.coupling_kernel)
+    for k, force in enumerate(system.forces):
+        model.forces[k].effort_slope = tape(force.effort)
+    return slopes

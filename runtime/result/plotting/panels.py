@@ -17,7 +17,6 @@ from .curve_interpolation import curve
 from .default_quantities import DefaultPanel, choose_panels
 from .plot_sources import PlotSource
 from .spectra import spectrum
-from .titles import common_noun, with_unit
 
 #: Kinds of plots: over time or another quantity, rate over quantity, or over frequency.
 PLOT_KINDS = ("time", "phase", "spectrum")
@@ -179,22 +178,6 @@ def _first_columns(quantities: Sequence[Quantity]) -> list[int]:
     return [sum(counts[:k]) for k in range(len(counts))]
 
 
-def _panel_titles(
-    quantities: Sequence[Quantity], runs: Mapping[str, PlotSource], selection: PlotSelection
-) -> tuple[str, str, bool]:
-    """Title, label of the x axis, and whether both axes are lengths."""
-    text, unit = common_noun(quantities), quantities[0].unit
-    if selection.against is not None:
-        abscissa = _require_scalar(_first_quantity(runs, selection.against))
-        x_label = with_unit(common_noun([abscissa]), abscissa.unit)
-        return with_unit(text, unit), x_label, unit == abscissa.unit == "m"
-    if selection.kind == "phase":
-        return with_unit(f"rate of {text}", rate_unit(unit)), with_unit(text, unit), False
-    if selection.kind == "spectrum":
-        return with_unit(f"amplitude of {text}", unit), "frequency (Hz)", False
-    return with_unit(text, unit), "time (s)", False
-
-
 def _drawn_curves(
     run: PlotSource, quantity: Quantity, selection: PlotSelection
 ) -> Iterator[tuple[Array, Array]]:
@@ -232,3 +215,84 @@ def _require_scalar(quantity: Quantity) -> Quantity:
             f"as {quantity.name}.{quantity.labels[0]}"
         )
     return quantity
+
+
+# --- titles ---------------------------------------------------------------------------------------
+
+#: Nouns of quantities that share only a unit.
+_NOUN_BY_UNIT = {
+    "rad": "angles", "m": "lengths", "rad/s": "angular velocities", "m/s": "velocities",
+    "rad/s2": "angular accelerations", "m/s2": "accelerations", "N": "forces", "N*m": "moments",
+    "J": "energies", "W": "powers", "kg*m/s": "momenta", "kg*m2/s": "angular momenta",
+    "": "numbers",
+}  # fmt: skip
+
+_UNIT_TEXT = {
+    "N*m": "N m",
+    "m/s2": "m/s²",
+    "rad/s2": "rad/s²",
+    "kg*m/s": "kg m/s",
+    "kg*m2/s": "kg m²/s",
+}
+
+#: Largest number of owners that are named individually.
+_MAX_NAMED_OWNERS = 3
+
+
+def _panel_titles(
+    quantities: Sequence[Quantity], runs: Mapping[str, PlotSource], selection: PlotSelection
+) -> tuple[str, str, bool]:
+    """Title, label of the x axis, and whether both axes are lengths."""
+    text, unit = _common_noun(quantities), quantities[0].unit
+    if selection.against is not None:
+        abscissa = _require_scalar(_first_quantity(runs, selection.against))
+        x_label = _with_unit(_common_noun([abscissa]), abscissa.unit)
+        return _with_unit(text, unit), x_label, unit == abscissa.unit == "m"
+    if selection.kind == "phase":
+        return _with_unit(f"rate of {text}", rate_unit(unit)), _with_unit(text, unit), False
+    if selection.kind == "spectrum":
+        return _with_unit(f"amplitude of {text}", unit), "frequency (Hz)", False
+    return _with_unit(text, unit), "time (s)", False
+
+
+def _with_unit(text: str, unit: str) -> str:
+    """Text with its unit: angle of hinge elbow (rad)."""
+    unit_text = _UNIT_TEXT.get(unit, unit)
+    return f"{text} ({unit_text})" if unit_text else text
+
+
+def _common_noun(quantities: Sequence[Quantity]) -> str:
+    """Common noun of quantities of one unit.
+
+    "angle of hinge elbow", "angle of hinges a, b", "lengths".
+    """
+    first = quantities[0]
+    if len(quantities) == 1:
+        return first.long_name if first.owner or not first.description else first.description
+    owners = list(dict.fromkeys(quantity.owner for quantity in quantities))
+    if (
+        len({quantity.description or quantity.long_name for quantity in quantities}) == 1
+        and first.description
+    ):
+        return (
+            f"{first.description} of {_join_owners(owners)}" if first.owner else first.description
+        )
+    descriptions = list(
+        dict.fromkeys(quantity.description or quantity.name for quantity in quantities)
+    )
+    if not any(owners) and len(descriptions) <= _MAX_NAMED_OWNERS:
+        return ", ".join(descriptions)
+    text = _NOUN_BY_UNIT.get(first.unit, "quantities")
+    return f"{text} of {owners[0]}" if len(owners) == 1 and owners[0] else text
+
+
+def _join_owners(owners: list[str]) -> str:
+    """Joined owners: hinges elbow, wrist; rod1, rod2; 7 hinges."""
+    words = {owner.partition(" ")[0] if " " in owner else "" for owner in owners}
+    word = words.pop() if len(words) == 1 else ""
+    if len(owners) == 1:
+        return owners[0]
+    if len(owners) > _MAX_NAMED_OWNERS:
+        return f"{len(owners)} {word}s" if word else f"{len(owners)} bodies and ends"
+    names = [owner.removeprefix(f"{word} ") if word else owner for owner in owners]
+    return f"{word}s {', '.join(names)}" if word else ", ".join(names)

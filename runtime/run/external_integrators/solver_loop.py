@@ -24,11 +24,11 @@ from ...platform_support.interrupts import Interrupt, record_interrupts
 from ..integration_run import split, tolerances
 from ..run_notes import chattering_note, missed_switch_note
 from ..stop_messages import curve_end_message, expression_cause, fastest_speed, rest_note
-from ..switch_crossings import Crossings, ProgressCheck, shortened_step_end
 from ..trajectory import Trajectory
 from . import sundials
 from .callbacks import Equations, RunEnded
 from .event_location import ConditionValues, StepConditions
+from .switch_crossings import Crossings, ProgressCheck, shortened_step_end
 
 if TYPE_CHECKING:
     from ...engine.compiled_scene import CompiledScene

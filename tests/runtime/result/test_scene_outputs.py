@@ -14,8 +14,8 @@ import pytest
 import mstmm
 from mstmm.errors import SceneError
 from mstmm.pipeline.compilation import compile_level
+from mstmm.runtime.advice.advice_summary import with_available_outputs
 from mstmm.runtime.advice.beam_splitting import split_beams
-from mstmm.runtime.advice.reduced_outputs import with_available_outputs
 from mstmm.runtime.chart.model_levels import with_model_level
 from mstmm.runtime.engine.observation_columns import SUMS
 from mstmm.runtime.result.result import Result

@@ -17,7 +17,7 @@ import mstmm
 from mstmm.runtime.integrate.c_loop import Statistics, Status
 from mstmm.runtime.integrate.settings import Settings
 from mstmm.runtime.model.target_error import method_choice, tolerance_search
-from mstmm.runtime.model.target_error.struck_beam import starts_vibrating
+from mstmm.runtime.model.target_error.initial_vibration import starts_vibrating
 from mstmm.runtime.result.export.provenance import file_attributes
 from mstmm.runtime.run import run_execution
 

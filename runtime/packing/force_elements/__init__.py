@@ -1,1 +1,0 @@
-"""Massless force elements between two ends: springs, user-defined types and bushings."""
