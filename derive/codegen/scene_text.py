@@ -17,8 +17,7 @@ import mstmm.templates
 from mstmm.abi.fused_library import ABI_VERSION, COMPILER_FLAGS, DECLARATIONS, SYMBOL
 from mstmm.ir import Element, KernelIR, Operand
 
-from ..fuse.optimisation.instruction_scheduling import interleave
-from ..fuse.optimisation.register_pressure import thrifty
+from ..fuse.optimisation.instruction_scheduling import interleave, thrifty
 from ..fuse.optimisation.sincos_pairing import Angle, gather
 from .function_splitting import MAX_UNSPLIT_SIZE, FunctionParts, statement_text
 from .guard_text import Guards

@@ -7,7 +7,7 @@ import sympy as sp
 from ..definition.derivation import Derivation, Equation, Quantity, tilde, vector
 from ..definition.element import ForceElement, Symbols, describe_array
 from ..definition.nonsmooth_functions import slope
-from ..definition.rotation_derivatives import rotating_derivative
+from ..definition.rotations import rotating_derivative
 
 #: Failure code of a force element whose direction is undefined (`domain`).
 UNDEFINED = 2

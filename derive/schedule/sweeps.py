@@ -22,8 +22,15 @@ from .loop_closure import (
     ROW_ELIMINATION,
     ROW_MULTIPLIER,
 )
-from .mass_matrix import COMPOSITION, HINGE_EFFORTS, OUTBOARD_LOAD
-from .mass_matrix_solve import COLUMN, COLUMN_BACKWARD, COLUMN_FORWARD, FACTORISE
+from .mass_matrix import (
+    COLUMN,
+    COLUMN_BACKWARD,
+    COLUMN_FORWARD,
+    COMPOSITION,
+    FACTORISE,
+    HINGE_EFFORTS,
+    OUTBOARD_LOAD,
+)
 from .pass_steps import Pass, Run, Sweep
 from .planar_passes import planar_sweep
 from .qr_sweep import QR_CONDENSE, QR_OWN

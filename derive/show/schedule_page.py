@@ -1,4 +1,4 @@
-"""Page of the sweep's schedule: sweeps, passes, slots and traits."""
+"""Page of the sweep: its equations, and its schedule of sweeps, passes, slots and traits."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ from itertools import groupby
 
 from mstmm.errors import ElementError
 
+from ..catalogue.kernels import built_in_kernels
 from ..codegen.kernel_calls import MAX_SPEEDS, NAMED_CALLEES, POINTER_CALLEES, Specs
 from ..codegen.sweep_text import all_passes, sweep_files
+from ..equations.rigid_body import newton_euler_form
 from ..schedule.differentiated_passes import ports_of
 from ..schedule.pass_steps import (
     Add,
@@ -33,11 +35,11 @@ from ..schedule.pass_steps import (
 )
 from ..schedule.slot_definitions import CONSTANTS, SLOTS, TRAITS
 from ..schedule.sweeps import SWEEPS
-from .document import Code, Heading, Item, Paragraph
+from .document import Code, FormulaWriter, Heading, Item, Paragraph
+from .entry_names import DeclaredNames
 from .formula_width import TextWidth
 from .plain_text import WIDTH
 from .show_page import FORMATS, render_page
-from .sweep_walkthrough import walkthrough_items
 
 #: Introduction of the page.
 _EXPLANATION = (
@@ -68,7 +70,7 @@ def sweep_page(at: str, format: str, specs: Callable[[], Specs]) -> str:
 
 def _page_items(steps: _StepWriter, measure: TextWidth) -> Iterator[Item]:
     yield Heading("The sweep", 1)
-    yield from walkthrough_items(measure)
+    yield from _equation_items(measure)
     yield Heading("The schedule", 2)
     yield Paragraph(_EXPLANATION)
     for sweep in SWEEPS:
@@ -259,3 +261,44 @@ def _definition_rows(head: str, width: int, meaning: str) -> str:
     lines = textwrap.wrap(meaning, WIDTH - width - 3)
     continuation = [" " * (width + 3) + line for line in lines[1:]]
     return "\n".join([f"  {head:{width}} {lines[0]}", *continuation])
+
+
+# --- sweep by its equations -----------------------------------------------------------------------
+
+#: Element whose kernels are shown, and the last equation on the hinge before the port.
+_ELEMENT, _ON_THE_HINGE = "generic2", "e_Q"
+
+
+def _equation_items(measure: TextWidth) -> Iterator[Item]:
+    """Chapters in the order of the sweep: motion, absorption, hinge, port, recovery."""
+    kernels = {kernel.name: kernel for kernel in built_in_kernels("sweep", _ELEMENT)}
+    body, forward = newton_euler_form(), kernels["forward"].derivation
+    condense, recover = kernels["condense"].derivation, kernels["recover"].derivation
+    names = [str(getattr(equation.left, "name", "")) for equation in condense.definitions]
+    port = names.index(_ON_THE_HINGE) + 1
+    chapters = (
+        ("Motion, root to tips",
+         "With zero accelerations of the free speeds, the motion is passed from body to body.",
+         forward, forward.definitions),
+        ("Contribution of a body",
+         "Deviations delta a from that motion require the load f = S a + e at the input end. The "
+         "body adds its mass matrix to S, and to e the load that the motion above requires; the "
+         "outboard bodies have already added their S and e.",
+         body, body.definitions),
+        ("Across a hinge, tips to root",
+         "On the free speeds the load is the effort tau, which gives udot = g - G a and leaves "
+         "S_Q and e_Q to the inboard side.",
+         condense, condense.definitions[:port]),
+        ("The port",
+         "Transformed to the axes of the parent and to its point P, they are added to its own.",
+         condense, condense.definitions[port:]),
+        ("Recovery, root to tips",
+         "At the root the deviation is zero. Every hinge computes its accelerations and passes "
+         "the deviation on to the outboard body.",
+         recover, recover.definitions),
+    )  # fmt: skip
+    for title, explanation, derivation, equations in chapters:
+        yield Heading(title, 2)
+        yield Paragraph(explanation)
+        writer = FormulaWriter(derivation, DeclaredNames(), measure)
+        yield from map(writer.formula, equations)

@@ -17,7 +17,7 @@ from mstmm.ir import OPERATIONS, Constant, KernelIR
 from mstmm.ir.interpreter import Values, replay_kernel
 from mstmm.ir.operations import Slope
 
-from .mpmath_arithmetic import PreciseArithmetic
+from .kernel_evaluation import PreciseArithmetic
 
 #: Unit roundoff of a double.
 UNIT_ROUNDOFF = 2.0**-53

@@ -6,16 +6,19 @@ rows, and no hinge inboard of it can change that matrix.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import heapq
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
 
 from .mechanism_graph import GROUND, MechanismGraph, RowGroup
-from .minimum_degree import Adjacency, elimination_order
 from .spanning_tree import spanning_tree
 from .tree_growth import Tree
 from .tree_paths import Paths, pending_cost
+
+#: For each group the groups it is coupled with.
+Adjacency = list[set[int]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,3 +141,34 @@ def _order_closures(
             for first_group, second_group in combinations(pending[body], 2):
                 adjacency[first_group].add(second_group)
                 adjacency[second_group].add(first_group)
+
+
+# --- minimum-degree ordering ----------------------------------------------------------------------
+
+
+def elimination_order(
+    groups: Iterable[int], couplings: Adjacency, rows: Sequence[int]
+) -> list[tuple[int, tuple[int, ...]]]:
+    """Order groups by minimum degree: (group, groups coupled with it when it is eliminated).
+
+    The degree of a group is the number of rows coupled with it; ties go to the lower group number.
+    Eliminating a group couples all groups that were coupled with it.  `couplings` is updated in
+    place, also for the groups that are not eliminated.
+    """
+    remaining = set(groups)
+    heap = [(sum(rows[neighbour] for neighbour in couplings[g]), g) for g in remaining]
+    heapq.heapify(heap)
+    order = []
+    while heap:
+        degree, group = heapq.heappop(heap)
+        coupled = couplings[group]
+        if group not in remaining or degree != sum(rows[neighbour] for neighbour in coupled):
+            continue
+        remaining.discard(group)
+        order.append((group, tuple(sorted(coupled))))
+        for neighbour in coupled:
+            couplings[neighbour] |= coupled
+            couplings[neighbour] -= {group, neighbour}
+        for neighbour in coupled & remaining:
+            heapq.heappush(heap, (sum(rows[index] for index in couplings[neighbour]), neighbour))
+    return order

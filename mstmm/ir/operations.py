@@ -2,7 +2,7 @@
 
 C, the tape, numpy, SymPy, the listing, folding, differentiation, expressions and the passes over
 fused code read this table.  A new operation needs a row here, a function in each of the C texts
-`fused_scalar_type.c` and `fused_lanes.c`, and an entry in derive/verification/mpmath_arithmetic.py
+`fused_scalar_type.c` and `fused_lanes.c`, and an entry in derive/verification/kernel_evaluation.py
 if mpmath computes it in another way.
 """
 

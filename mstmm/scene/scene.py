@@ -20,8 +20,7 @@ from ..notebook_html import NotebookDisplay
 from ..notebook_html import table as html_table
 from ..public_members import PublicMembers
 from ..risk import Risk, sentences
-from .checks import consistency as checks
-from .checks import couplings, flexible_bodies, user_types
+from .checks import consistency, couplings, doubtful_input, flexible_bodies, user_types
 from .files.write import to_toml
 from .tables.beam_keys import ROOT
 from .tables.constants import evaluate_constants
@@ -102,7 +101,7 @@ class Scene(PublicMembers, SceneTables, NotebookDisplay):
     @property
     def risks(self) -> tuple[Risk, ...]:
         """Warnings about accepted but doubtful input."""
-        return checks.risks(self)
+        return doubtful_input.risks(self)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -152,7 +151,7 @@ class Scene(PublicMembers, SceneTables, NotebookDisplay):
             object.__setattr__(self, table, _name_elements(table, getattr(self, table)))
         for table, elements in _tables_with_beam_roots(self).items():
             object.__setattr__(self, table, elements)
-        problems = checks.problems(self)
+        problems = consistency.problems(self)
         if problems:
             raise ValidationProblems(*problems)
         return self

@@ -1,12 +1,14 @@
-"""Statement order of straight-line code: independent parts of a sweep are interleaved.
+"""Statement order of straight-line code: for latencies in short code, for registers in long code.
 
 A sweep has independent parts: what the pivots need (inertias, from the tips), motion (from the
 root), and what needs both.  Each is a chain in which every body depends on its neighbour, and the
-processor's look-ahead of a few hundred instructions is shorter than a part.  So the parts are
-merged by a list scheduler that keeps the order within each part: register lifetimes hardly grow,
-and latencies overlap.
+processor's look-ahead of a few hundred instructions is shorter than a part.  So in short code the
+parts are merged by a list scheduler that keeps the order within each part: register lifetimes
+hardly grow, and latencies overlap.
 
-Worthwhile only for short code; in long code the extra spills cost more than the latency saved.
+In long code the extra spills cost more than the latency saved.  It is limited by its instructions,
+and a spilled value costs two of the slowest.  Among the next statements the first one is chosen
+that frees more registers than it takes; a statement moves by at most the window length.
 """
 
 from __future__ import annotations
@@ -17,8 +19,10 @@ from mstmm.ir import OPERATIONS, Assign, Guard
 
 from .statement_units import Line, reads_of, units_of
 
+# --- short code: independent parts interleaved ----------------------------------------------------
+
 #: Operations issued per cycle, and look-ahead into one part.
-_WIDTH, _WINDOW = 4, 8
+_WIDTH, _PART_WINDOW = 4, 8
 
 
 def interleave(statements: Sequence[Line]) -> list[Line]:
@@ -46,7 +50,7 @@ def _issue_order(
     while len(order) < len(dependencies):
         issued = 0
         for part in parts:
-            for k in part[:_WINDOW]:
+            for k in part[:_PART_WINDOW]:
                 if missing[k] or ready[k] > cycle or issued >= _WIDTH:
                     continue
                 part.remove(k)
@@ -85,3 +89,54 @@ def _independent_parts(
 def _latency(unit: Sequence[Line]) -> int:
     last = unit[-1]
     return OPERATIONS[last.op].latency if isinstance(last, Assign) else 0
+
+
+# --- long code: few values in registers -----------------------------------------------------------
+
+#: Window length in statements (measured: 20 to 100 perform the same, 1000 is worse).
+_REGISTER_WINDOW = 60
+
+
+def thrifty(statements: Sequence[Line]) -> list[Line]:
+    """Same statements with last readers of a value early; dependencies are kept."""
+    units = units_of(statements)
+    return [statement for k in _thrifty_order(reads_of(units)) for statement in units[k]]
+
+
+def _thrifty_order(dependencies: Sequence[set[int]]) -> list[int]:
+    """Order of units: in the window, the first computable one with the largest gain."""
+    readers: list[list[int]] = [[] for _ in dependencies]
+    for k, reads in enumerate(dependencies):
+        for j in reads:
+            readers[j].append(k)
+    remaining = [len(reads_of_unit) for reads_of_unit in readers]
+    missing = [len(reads) for reads in dependencies]
+    # Gain: registers freed by a unit less those taken.
+    gain = [
+        sum(remaining[j] == 1 for j in reads) - (remaining[k] > 0)
+        for k, reads in enumerate(dependencies)
+    ]
+    order: list[int] = []
+    window = list(range(min(_REGISTER_WINDOW, len(dependencies))))
+    following = len(window)
+    done = [False] * len(dependencies)
+    while window:
+        best = -1
+        for position, k in enumerate(window):
+            if missing[k] == 0 and (best < 0 or gain[k] > gain[window[best]]):
+                best = position
+                if gain[k] > 0:
+                    break
+        chosen = window.pop(best)
+        if following < len(dependencies):
+            window.append(following)
+            following += 1
+        order.append(chosen)
+        done[chosen] = True
+        for k in readers[chosen]:
+            missing[k] -= 1
+        for j in dependencies[chosen]:
+            remaining[j] -= 1
+            if remaining[j] == 1:
+                gain[next(k for k in readers[j] if not done[k])] += 1
+    return order

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
+from dataclasses import MISSING, fields
+from inspect import Parameter, Signature
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Any, get_args, get_type_hints
 
 import typer
 
 from mstmm.defaults import METHOD
 from mstmm.errors import NumericalFailure, SceneError
+from mstmm.runtime.integrate.methods import FAMILIES
 
-from ..dataclass_command import dataclass_command, method_parameters
 from ..extra_checks import require_extra_for
 from ..model_loading import compile_file, generate_elements, load_method
-from ..options import with_inputs
+from ..options import integer_parser, parse_not_negative, with_inputs
 from ..progress import progress_bar
 from .resumable_run import (
     keep_checkpoint_on_error,
@@ -55,9 +58,6 @@ def _simulate(plan: RunOptions) -> None:
         raise typer.Exit(print_risks(plan, rejection))
 
 
-simulate = dataclass_command(RunOptions, _simulate, {"method_options": method_parameters()})
-
-
 def _compile_model(plan: RunOptions) -> Model:
     """Compile the scene, and check that it has all requested quantities."""
     import mstmm
@@ -86,3 +86,62 @@ def _compile_model(plan: RunOptions) -> Model:
                 )
                 raise SceneError(f"--quantity {text}") from None
     return model
+
+
+# --- command line ---------------------------------------------------------------------------------
+
+_PARSERS: dict[type, Callable[[Any], Any] | None] = {
+    float: parse_not_negative, int: integer_parser(0), str: None,
+}  # fmt: skip
+
+
+def _command_with_options(run: Callable[[RunOptions], None]) -> Callable[..., None]:
+    """Command with a parameter for each field of RunOptions and each option of a method.
+
+    `run` receives the options; `method_options` has the values of those given for the method.
+    """
+    hints = get_type_hints(RunOptions, include_extras=True)
+    method_parameters = _method_parameters()
+    parameters = [
+        Parameter(
+            item.name,
+            Parameter.KEYWORD_ONLY,
+            default=Parameter.empty if item.default is MISSING else item.default,
+            annotation=hints[item.name],
+        )
+        for item in fields(RunOptions)
+        if item.name != "method_options"
+    ] + method_parameters
+
+    def command(**values: Any) -> None:
+        given = {p.name: values.pop(p.name) for p in method_parameters}
+        method_options = {name: value for name, value in given.items() if value is not None}
+        run(RunOptions(**values, method_options=method_options))
+
+    command.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
+    command.__annotations__ = {p.name: p.annotation for p in parameters}
+    command.__doc__, command.__name__ = run.__doc__, run.__name__
+    return command
+
+
+def _method_parameters() -> list[Parameter]:
+    """One parameter for each option of integration methods; None where not given."""
+    parameters: dict[str, Parameter] = {}
+    for family in FAMILIES:
+        hints = get_type_hints(family)
+        for item in fields(family):
+            if item.name == "name":
+                continue
+            kind: Any = (get_args(hints[item.name]) or (hints[item.name],))[0]
+            option = typer.Option(
+                f"--{item.name.replace('_', '-')}", metavar=item.metadata["metavar"],
+                help=item.metadata["description"], parser=_PARSERS[kind],
+            )  # fmt: skip
+            annotation: Any = Annotated[kind | None, option]
+            parameters[item.name] = Parameter(
+                item.name, Parameter.KEYWORD_ONLY, default=None, annotation=annotation
+            )
+    return list(parameters.values())
+
+
+simulate = _command_with_options(_simulate)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from itertools import chain as one_after_another
@@ -11,17 +10,16 @@ from typing import TYPE_CHECKING
 
 from ...expression.expression import Expression
 from ...expression.parser import context_of_name
-from ...risk import Risk
 from ..tables.closures import CURVE
 from ..validators.inertia import negative_moment_message, triangle_message
 from ..validators.scalars_and_vectors import GROUND, Location, split_reference
 from ..validators.validation_messages import MAX_PROBLEMS, TABLES, Problem, did_you_mean
-from . import constraints, couplings, external_names, flexible_bodies, idle_loads, inputs, topology
-from .degree_warnings import degree_warnings
+from . import constraints, couplings, flexible_bodies, inputs, topology
 from .expression_names import Scope, modal_names, name_problem
 
 if TYPE_CHECKING:
     from ..tables.body import BodyTable
+    from ..tables.body_hinge_lookup import Bodies
     from ..tables.scene_tables import SceneTables
 
 
@@ -35,7 +33,7 @@ def problems(scene: SceneTables) -> list[Problem]:
         _inertia_problems(scene),
         inputs.problems(scene),
         flexible_bodies.problems(scene),
-        external_names.problems(scene),
+        _external_name_problems(scene),
     )
     return first_findings or _first_problems(
         _expression_problems(scene), inputs.drive_problems(scene), constraints.problems(scene),
@@ -168,7 +166,7 @@ def _axes_problems(scene: SceneTables, i: int) -> Iterator[Problem]:
         )
 
 
-def _body_tables(scene: SceneTables) -> Iterator[tuple[Location, str, BodyTable]]:
+def body_tables(scene: SceneTables) -> Iterator[tuple[Location, str, BodyTable]]:
     """Yield (location, name for messages, table) of every body table, chain patterns included."""
     for i, body in enumerate(scene.body):
         yield ("body", i), f'body "{body.name}"', body
@@ -178,7 +176,7 @@ def _body_tables(scene: SceneTables) -> Iterator[tuple[Location, str, BodyTable]
 
 
 def _inertia_problems(scene: SceneTables) -> Iterator[Problem]:
-    for location, _, body in _body_tables(scene):
+    for location, _, body in body_tables(scene):
         if scene.allow_unphysical_inertia or body.allow_unphysical_inertia:
             continue
         negative_text = negative_moment_message(body.inertia_matrix)
@@ -194,72 +192,6 @@ def _inertia_problems(scene: SceneTables) -> Iterator[Problem]:
 
 
 _ACCEPT_KEY = "allow_unphysical_inertia = true"
-
-
-def risks(scene: SceneTables) -> tuple[Risk, ...]:
-    """Warnings about accepted but doubtful input.
-
-    They concern impossible inertias, angles that look like degrees, beams outside their theory,
-    unused inputs, and loads without effect.
-    """
-    warnings, rounded_moments = [], []
-    for _, name, body in _body_tables(scene):
-        message = triangle_message(body.inertia_matrix)
-        if message is not None:
-            means = f"{name}: inertia: {message}; accepted because of allow_unphysical_inertia"
-            remedy = "correct it unless it does not describe a real body"
-            warnings.append(
-                Risk("inertia", name, means, remedy, invalidates=False, seen_before_run=True)
-            )
-        rounded_moments += [(name, x) for k, x in enumerate(body.inertia[:3])
-                  if x < 0 and body.inertia_matrix[k][k] == 0]  # fmt: skip
-    if rounded_moments:
-        name, entry = rounded_moments[0]
-        more_text = f" (and {len(rounded_moments) - 1} more)" if len(rounded_moments) > 1 else ""
-        means = f"{name}: inertia: {entry:.3g} kg m^2 is rounding and is treated as zero{more_text}"
-        warnings.append(
-            Risk(
-                "inertia",
-                name,
-                means,
-                "write 0",
-                entry,
-                0.0,
-                "kg*m2",
-                invalidates=False,
-                seen_before_run=True,
-            )
-        )
-    return (
-        *warnings,
-        *_proportion_warnings(scene),
-        *degree_warnings(scene),
-        *flexible_bodies.flexible_warnings(scene),
-        *inputs.unused_input_warnings(scene),
-        *idle_loads.idle_load_warnings(scene),
-    )
-
-
-#: Extent in m above which a rigid body below this mass per extent in kg/m suggests wrong units.
-_MIN_LONG_EXTENT, _MAX_LIGHT_MASS_PER_LENGTH = 20.0, 2e-3
-
-
-def _proportion_warnings(scene: SceneTables) -> Iterator[Risk]:
-    """Warnings about rigid bodies so long and light that their lengths are probably in mm."""
-    for _, name, body in _body_tables(scene):
-        points = [body.center_of_mass, *(end.position for end in body.ends.values())]
-        extent = max(math.dist((0.0, 0.0, 0.0), location) for location in points)
-        if (
-            body.type == "rigid"
-            and extent >= _MIN_LONG_EXTENT
-            and 0 < body.mass <= _MAX_LIGHT_MASS_PER_LENGTH * extent
-        ):
-            yield Risk(
-                "proportions", name,
-                f"{name}: it extends over {extent:g} m with a mass of {body.mass:g} kg",
-                "lengths are in m and masses in kg; convert other units", body.mass / extent,
-                _MAX_LIGHT_MASS_PER_LENGTH, "kg/m", invalidates=False, seen_before_run=True,
-            )  # fmt: skip
 
 
 # --- names in expressions -------------------------------------------------------------------------
@@ -303,3 +235,34 @@ def _name_problems(expression: Expression, scope: Scope, place: Location) -> Ite
         message = name_problem(name, scope)
         if message is not None:
             yield place, message + context_of_name(expression.text, name)
+
+
+# --- names of other programs ----------------------------------------------------------------------
+
+
+def _external_name_problems(scene: SceneTables) -> Iterator[Problem]:
+    """Problems of [names]: names for missing elements, and names that another element has."""
+    bodies, hinges, modal = scene.skeleton.bodies, scene.hinges, modal_names(scene)
+    for name, scene_name in scene.names.body.items():
+        if scene_name.endswith(".") or not _is_body_or_end(scene_name, bodies):
+            hint = did_you_mean(split_reference(scene_name)[0], (GROUND, *bodies.names()))
+            yield ("names", "body", name), f'there is no body or end "{scene_name}"{hint}'
+        elif name != scene_name and _is_body_or_end(name, bodies):
+            yield ("names", "body", name), _used_name_message(name, "a body or an end")
+    for name, scene_name in scene.names.hinge.items():
+        if hinges.find(scene_name) is None:
+            yield ("names", "hinge", name), hinges.missing(scene_name)
+        elif name != scene_name and hinges.find(name) is not None:
+            yield ("names", "hinge", name), _used_name_message(name, "a hinge")
+        elif name in modal:
+            yield ("names", "hinge", name), _used_name_message(name, "a flexible body")
+
+
+def _used_name_message(name: str, what: str) -> str:
+    return f'"{name}" is already the name of {what} of the scene; leave it out'
+
+
+def _is_body_or_end(reference: str, bodies: Bodies) -> bool:
+    body, end = split_reference(reference)
+    ends = bodies.ends(body)
+    return reference == GROUND or (ends is not None and (not end or end in ends))

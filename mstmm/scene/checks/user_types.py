@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -9,7 +10,6 @@ from ...expression.expression import Expression
 from ...ir.element_spec import ElementSpec
 from ...ir.hinge_properties import builtin_hinges, effort_unit
 from ..tables.hinge_rules import resolve_defaults_for, unexpected_keys
-from ..validators.joint_synonyms import hinge_type_for
 from ..validators.scalars_and_vectors import Location, ValidationProblems
 from ..validators.validation_messages import Problem, did_you_mean
 from .expression_names import index_problem
@@ -54,7 +54,7 @@ def type_problems(
         spec = known.get((kind, element.type))
         if spec is None:
             user_types = [name for k, name in known if k == kind]
-            synonym_of = hinge_type_for(element.type) if kind == "hinge" else None
+            synonym_of = _hinge_type_for(element.type) if kind == "hinge" else None
             hint = did_you_mean(element.type, [*builtin[kind], *user_types])
             hint = f'; use "{synonym_of}"' if synonym_of else hint
             type_problem_list.append(
@@ -238,3 +238,23 @@ def _all_expressions(
         yield ("spring", i, "law", "effort"), spring.law.effort, None
     for i, coupling in enumerate(scene.coupling):
         yield ("coupling", i, coupling.key), coupling.row, None
+
+
+# --- synonyms of hinge types ----------------------------------------------------------------------
+
+_HINGE_TYPES_BY_SYNONYM = {
+    "revolute": "pin", "continuous": "pin", "hinge": "pin", "pivot": "pin", "rotational": "pin",
+    "slider": "prismatic", "slide": "prismatic", "translational": "prismatic",
+    "spherical": "ball", "socket": "ball", "ballandsocket": "ball",
+    "weld": "fixed", "rigid": "fixed", "clamp": "fixed", "clamped": "fixed",
+    "floating": "free", "freejoint": "free", "freeflyer": "free",
+    "cardan": "universal", "hooke": "universal", "helical": "screw", "bushing": "elastic",
+}  # fmt: skip
+
+
+def _hinge_type_for(word: str) -> str | None:
+    """Hinge type for a synonym used by other programs; None for an unknown one."""
+    normalised = re.sub("[^a-z]", "", word.lower())
+    return _HINGE_TYPES_BY_SYNONYM.get(normalised) or _HINGE_TYPES_BY_SYNONYM.get(
+        re.sub("(joint|hinge)$", "", normalised)
+    )

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import stat
 from collections.abc import Collection, Iterator
+from math import prod
 from pathlib import Path
 
 from ...argument_validation import abbreviate
 from ...errors import SceneError
 from ..files.read import read_content
-from .mjcf_limits import MAX_ELEMENT_COUNT, check_element, count_copies
 from .xml_reader import Element, parse_xml
 
 #: Most nested elements: bodies of a long chain are nested.
 _MAX_DEPTH = 2000
+#: Most elements of a model, including copies by `replicate` and others.
+_MAX_ELEMENT_COUNT = 200_000
 #: Most files of a model, and the largest of them in MB: MJCF, and meshes or textures.
 _MAX_FILE_COUNT, _MAX_FILE_SIZE_MB, _MAX_ASSET_SIZE_MB = 200, 16, 200
 #: Tags that refer to another MJCF file.
@@ -44,12 +46,12 @@ def check_included_files(content: bytes, path: Path, where: str) -> Locations:
         for section, element, copy_count in _elements_with_copies(
             parse_xml(content, where, _MAX_DEPTH), copies
         ):
-            check_element(element)
+            _check_element(element)
             element_count += copy_count
-            if element_count > MAX_ELEMENT_COUNT:
+            if element_count > _MAX_ELEMENT_COUNT:
                 raise SceneError(
                     f"{element.where}: <{element.tag}>: the model has more than "
-                    f"{MAX_ELEMENT_COUNT} elements including copies; leave some out"
+                    f"{_MAX_ELEMENT_COUNT} elements including copies; leave some out"
                 )
             folders.update(
                 element.attributes[key] for key in _FOLDER_KEYS if key in element.attributes
@@ -141,7 +143,50 @@ def _elements_with_copies(one: Element, copies: int) -> Iterator[tuple[str, Elem
     stack = [("", one, copies)]
     while stack:
         section, one, copies = stack.pop()
-        copies *= count_copies(one)
+        copies *= _count_copies(one)
         yield section, one, copies
         inner_section = one.tag if one.tag in _SECTIONS else ""
         stack += [(inner_section, child, copies) for child in reversed(one.children)]
+
+
+# --- limits of elements ---------------------------------------------------------------------------
+
+#: Most numbers that MuJoCo stores for an element: points of a height field, pixels of a texture.
+_MAX_STORED_NUMBERS = 2**24
+#: Elements that create copies of their content.
+_COPYING_TAGS = ("replicate", "composite", "flexcomp")
+#: Keys whose product is the size of an element.
+_SIZE_KEYS = {"hfield": ("nrow", "ncol"), "texture": ("width", "height")}
+
+
+def _check_element(element: Element) -> None:
+    """Reject tags in capitals, some of which MuJoCo misreads, and too large elements.
+
+    Raises SceneError.
+    """
+    if element.tag != element.tag.lower():
+        raise SceneError(
+            f"{element.where}: unknown element <{element.tag}>; write <{element.tag.lower()}>"
+        )
+    size = prod(_whole_numbers(element, key, 1)[0] for key in _SIZE_KEYS.get(element.tag, ()))
+    if size > _MAX_STORED_NUMBERS:
+        raise SceneError(
+            f"{element.where}: <{element.tag}>: expected at most {_MAX_STORED_NUMBERS} numbers, "
+            f"found {size}; make it coarser, or leave it out"
+        )
+
+
+def _count_copies(element: Element) -> int:
+    """Number of copies of the content that an element creates."""
+    return prod(_whole_numbers(element, "count", 3)) if element.tag in _COPYING_TAGS else 1
+
+
+def _whole_numbers(element: Element, key: str, most: int) -> list[int]:
+    """Whole numbers of an attribute, at least 1; MuJoCo reports invalid text."""
+    values = []
+    for number_text in element.attributes.get(key, "").split()[:most]:
+        try:
+            values.append(max(1, int(float(number_text))))
+        except (ValueError, OverflowError):
+            values.append(1)
+    return values or [1]

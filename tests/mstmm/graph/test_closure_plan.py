@@ -8,9 +8,8 @@ from functools import partial
 
 import pytest
 
-from mstmm.graph.closure_plan import ClosurePlan, closure_plan
+from mstmm.graph.closure_plan import ClosurePlan, closure_plan, elimination_order
 from mstmm.graph.mechanism_graph import GROUND, Edge, MechanismGraph, RowGroup
-from mstmm.graph.minimum_degree import elimination_order
 from tests.support.graph import exhaustive_search as reference
 from tests.support.graph.mechanisms import (
     four_bars,

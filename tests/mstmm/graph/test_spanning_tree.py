@@ -5,9 +5,8 @@ from __future__ import annotations
 import pytest
 
 from mstmm.graph.closure_plan import closure_plan
-from mstmm.graph.edge_swaps import improve_by_swaps
 from mstmm.graph.mechanism_graph import GROUND, Edge, MechanismGraph
-from mstmm.graph.spanning_tree import spanning_tree
+from mstmm.graph.spanning_tree import improve_by_swaps, spanning_tree
 from mstmm.graph.tree_growth import breadth_first_tree, depth_first_tree, random_tree
 from mstmm.graph.tree_paths import Paths, total_cost
 from tests.support.graph import exhaustive_search as reference

@@ -6,8 +6,7 @@ from collections.abc import Callable, Sequence
 
 import pytest
 
-from mstmm.derive.fuse.optimisation.instruction_scheduling import interleave
-from mstmm.derive.fuse.optimisation.register_pressure import thrifty
+from mstmm.derive.fuse.optimisation.instruction_scheduling import interleave, thrifty
 from mstmm.derive.fuse.optimisation.sincos_pairing import gather
 from mstmm.derive.fuse.optimisation.statement_units import Line, operands
 from mstmm.ir import Assign, Guard, KernelIR, Port, Store, Temporary

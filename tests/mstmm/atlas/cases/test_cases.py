@@ -11,7 +11,7 @@ import pytest
 
 import mstmm
 from mstmm.atlas import cases
-from mstmm.atlas.case_plot import MeasuredCase
+from mstmm.atlas.atlas import MeasuredCase
 
 #: Case -> between what its frontier is expected (in its unit), and how far the remedy must hold.
 #: From where not said otherwise: the growth of tests/system/robustness/test_growth.py.

@@ -9,7 +9,9 @@ import pytest
 
 from mstmm.errors import SceneError
 from mstmm.ir.element_spec import ElementSpec, Param
+from mstmm.ir.hinge_properties import builtin_hinges
 from mstmm.scene import Scene, load_scene
+from mstmm.scene.checks.user_types import _HINGE_TYPES_BY_SYNONYM, _hinge_type_for
 from tests.support.scenes.minimal import arm, body, change_value, hinge, one_rod
 
 KNEE = ElementSpec(
@@ -181,3 +183,9 @@ def test_parameters_are_names_in_expressions() -> None:
     with pytest.raises(SceneError, match="'radios' is unknown; did you mean \"radius\""):
         Scene(**knee(law={"effort": ["radios*t", 0]}))
     assert hinge()["name"] == "shoulder"
+
+
+def test_words_of_others_lead_to_hinges_that_there_are() -> None:
+    assert set(_HINGE_TYPES_BY_SYNONYM.values()) <= set(builtin_hinges())
+    assert not set(_HINGE_TYPES_BY_SYNONYM) & set(builtin_hinges())
+    assert _hinge_type_for("Ball-and-socket joint") == "ball" and _hinge_type_for("elbow") is None

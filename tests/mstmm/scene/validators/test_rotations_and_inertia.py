@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 
 import mstmm
-from mstmm.ir.hinge_properties import builtin_hinges
 from mstmm.numerics.rotations import from_orientation, from_rpy
-from mstmm.scene.validators.joint_synonyms import _HINGE_TYPES_BY_SYNONYM, hinge_type_for
 
 TURN = np.array(from_rpy([0.3, -1.2, 2.5]))
 
@@ -62,9 +60,3 @@ def test_an_inertia_in_rows_and_in_axes_of_its_own() -> None:
 def test_what_is_no_rotation_and_no_inertia(given: dict[str, Any], message: str) -> None:
     with pytest.raises(mstmm.SceneError, match=message):
         scene(**given)
-
-
-def test_words_of_others_lead_to_hinges_that_there_are() -> None:
-    assert set(_HINGE_TYPES_BY_SYNONYM.values()) <= set(builtin_hinges())
-    assert not set(_HINGE_TYPES_BY_SYNONYM) & set(builtin_hinges())
-    assert hinge_type_for("Ball-and-socket joint") == "ball" and hinge_type_for("elbow") is None

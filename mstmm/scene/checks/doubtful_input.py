@@ -1,0 +1,130 @@
+"""Warnings about accepted but doubtful input of a scene: inertias, proportions, angles, loads."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+from ...risk import Risk
+from ..validators.inertia import triangle_message
+from . import flexible_bodies, idle_loads, inputs
+from .consistency import body_tables
+
+if TYPE_CHECKING:
+    from ..tables.hinge import HingeTable
+    from ..tables.scene_tables import SceneTables
+
+
+def risks(scene: SceneTables) -> tuple[Risk, ...]:
+    """Warnings about accepted but doubtful input.
+
+    They concern impossible inertias, angles that look like degrees, beams outside their theory,
+    unused inputs, and loads without effect.
+    """
+    return (
+        *_inertia_warnings(scene),
+        *_proportion_warnings(scene),
+        *_degree_warnings(scene),
+        *flexible_bodies.flexible_warnings(scene),
+        *inputs.unused_input_warnings(scene),
+        *idle_loads.idle_load_warnings(scene),
+    )
+
+
+def _inertia_warnings(scene: SceneTables) -> Iterator[Risk]:
+    """Warnings about impossible inertias, and about negative moments that are rounding."""
+    rounded_moments = []
+    for _, name, body in body_tables(scene):
+        message = triangle_message(body.inertia_matrix)
+        if message is not None:
+            means = f"{name}: inertia: {message}; accepted because of allow_unphysical_inertia"
+            remedy = "correct it unless it does not describe a real body"
+            yield Risk("inertia", name, means, remedy, invalidates=False, seen_before_run=True)
+        rounded_moments += [(name, x) for k, x in enumerate(body.inertia[:3])
+                  if x < 0 and body.inertia_matrix[k][k] == 0]  # fmt: skip
+    if rounded_moments:
+        name, entry = rounded_moments[0]
+        more_text = f" (and {len(rounded_moments) - 1} more)" if len(rounded_moments) > 1 else ""
+        means = f"{name}: inertia: {entry:.3g} kg m^2 is rounding and is treated as zero{more_text}"
+        yield Risk(
+            "inertia", name, means, "write 0", entry, 0.0, "kg*m2", invalidates=False,
+            seen_before_run=True,
+        )  # fmt: skip
+
+
+#: Extent in m above which a rigid body below this mass per extent in kg/m suggests wrong units.
+_MIN_LONG_EXTENT, _MAX_LIGHT_MASS_PER_LENGTH = 20.0, 2e-3
+
+
+def _proportion_warnings(scene: SceneTables) -> Iterator[Risk]:
+    """Warnings about rigid bodies so long and light that their lengths are probably in mm."""
+    for _, name, body in body_tables(scene):
+        points = [body.center_of_mass, *(end.position for end in body.ends.values())]
+        extent = max(math.dist((0.0, 0.0, 0.0), location) for location in points)
+        if (
+            body.type == "rigid"
+            and extent >= _MIN_LONG_EXTENT
+            and 0 < body.mass <= _MAX_LIGHT_MASS_PER_LENGTH * extent
+        ):
+            yield Risk(
+                "proportions", name,
+                f"{name}: it extends over {extent:g} m with a mass of {body.mass:g} kg",
+                "lengths are in m and masses in kg; convert other units", body.mass / extent,
+                _MAX_LIGHT_MASS_PER_LENGTH, "kg/m", invalidates=False, seen_before_run=True,
+            )  # fmt: skip
+
+
+# --- angles in degrees ----------------------------------------------------------------------------
+
+
+def _degree_warnings(scene: SceneTables) -> Iterator[Risk]:
+    """Warnings about angles above one turn, which are usually meant in degrees."""
+    for hinge in scene.hinge:
+        yield from _hinge_warnings(f'hinge "{hinge.name}"', hinge)
+    for chain in scene.chain:
+        for k, table in enumerate(chain.hinge):
+            yield from _hinge_warnings(f'hinge {k + 1} of chain "{chain.name}"', table)
+        yield from _angle_warnings(f'chain "{chain.name}": orientation', chain.orientation or ())
+    for bushing in scene.bushing:
+        yield from _angle_warnings(f'bushing "{bushing.name}": orientation', bushing.orientation)
+        yield from _angle_warnings(f'bushing "{bushing.name}": rest', bushing.rest.orientation)
+    for body in scene.body:
+        yield from _end_warnings(body.name, body.ends)
+    for beam in scene.beam:
+        yield from _end_warnings(beam.name, beam.ends)
+    for elastic in scene.elastic:
+        yield from _end_warnings(elastic.name, elastic.ends)
+
+
+def _end_warnings(owner: str, ends: Mapping[str, Any]) -> Iterator[Risk]:
+    for name, end in ends.items():
+        yield from _angle_warnings(f'"{owner}.{name}": orientation', end.orientation)
+
+
+def _hinge_warnings(name: str, hinge: HingeTable) -> Iterator[Risk]:
+    yield from _angle_warnings(f"{name}: orientation", hinge.orientation)
+    facts = hinge.facts
+    if facts is None or facts.quaternion is not None:
+        return
+    start = () if hinge.initial is None else hinge.initial.q or ()
+    for k, coordinate in enumerate(facts.coordinates):
+        if coordinate.unit != "rad":
+            continue
+        yield from _angle_warnings(f"{name}: initial q", start, k)
+        yield from _angle_warnings(f"{name}: rest", hinge.law.rest, k)
+        for limits in hinge.law.limits[k : k + 1]:
+            yield from _angle_warnings(f"{name}: lower limit", (limits.lower or 0.0,))
+            yield from _angle_warnings(f"{name}: upper limit", (limits.upper or 0.0,))
+
+
+def _angle_warnings(what: str, values: tuple[float, ...], at: int | None = None) -> Iterator[Risk]:
+    selected = values if at is None else values[at : at + 1]
+    for value in selected:
+        if abs(value) > 2 * math.pi * (1 + 1e-9):
+            yield Risk(
+                "degrees", what.partition(": ")[0],
+                f"{what}: {value:.6g} rad is {abs(value) / (2 * math.pi):.3g} turns",
+                f"if degrees were meant, write {math.radians(value):.6g}", abs(value), 2 * math.pi,
+                "rad", invalidates=False, seen_before_run=True,
+            )  # fmt: skip
