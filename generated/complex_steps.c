@@ -20304,7 +20304,7 @@ static int mstmm_complex_at_tangent_elimination(mstmm_complex_state *state, int 
     int columns[6];
     const int speeds = mstmm_free_speeds(state->memory, body, columns);
     int code;
-    if (mstmm_omitted(state->model, state->observed, index)) return 0;
+    if (mstmm_is_skipped(state->model, state->observed, index)) return 0;
     if (body->modal && body->section && body->placed) {
         mstmm_complex *place = state->tangents->numbers + body->place;
         const mstmm_modal *modal = mstmm_modal_of(body);
@@ -20322,7 +20322,7 @@ static int mstmm_complex_at_tangent_elimination(mstmm_complex_state *state, int 
         const mstmm_section *section = body->section;
         double *laid = section ? state->workspace + section->place : NULL;
         mstmm_complex *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
-        code = mstmm_complex_judged(state, mstmm_complex_tangent_node(
+        code = mstmm_complex_elimination_code(state, mstmm_complex_tangent_node(
             .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .B = bend + MSTMM_BEND_B(n),
             .G = bend + MSTMM_BEND_G(n), .W = bend + MSTMM_BEND_W(n),
             .S = state->tangents->numbers + mstmm_carried_at(state->tangents, body),
@@ -20336,7 +20336,7 @@ static int mstmm_complex_at_tangent_elimination(mstmm_complex_state *state, int 
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
         mstmm_complex *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
-        code = mstmm_complex_judged(state, mstmm_complex_tangent_node(
+        code = mstmm_complex_elimination_code(state, mstmm_complex_tangent_node(
             .n = modal->n, .H = state->tangents->held + modal->tangent + MSTMM_BEND_ZERO_H(n), .B = bend + MSTMM_BEND_B(n),
             .G = bend + MSTMM_BEND_G(n), .W = bend + MSTMM_BEND_W(n),
             .S = state->tangents->numbers + mstmm_carried_at(state->tangents, body),
@@ -20399,7 +20399,7 @@ static int mstmm_complex_at_tangent_elimination(mstmm_complex_state *state, int 
             .W = tangent + MSTMM_TANGENT_W(body->nu, body->nq),
             .S = state->tangents->numbers + mstmm_carried_at(state->tangents, body), .K = K,
             .right = right, .D = D, .one = one);
-        code = mstmm_complex_judged(state, mstmm_complex_tangent_invert(
+        code = mstmm_complex_elimination_code(state, mstmm_complex_tangent_invert(
             .n = speeds, .D = D, .one = one,
             .inverse = tangent + MSTMM_TANGENT_INVERSE(body->nu, body->nq), .work = work));
         if (code) return mstmm_complex_fail(state, MSTMM_FAILED_TANGENT, index, code);
@@ -20496,7 +20496,7 @@ static int mstmm_complex_at_tangent_backward(mstmm_complex_state *state, int ind
     const mstmm_body *body = &state->model->bodies[index];
     int columns[6];
     const int speeds = mstmm_free_speeds(state->memory, body, columns);
-    if (mstmm_omitted(state->model, state->observed, index)) return 0;
+    if (mstmm_is_skipped(state->model, state->observed, index)) return 0;
     if (body->modal && body->section) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
@@ -20574,7 +20574,7 @@ static int mstmm_complex_at_tangent_forward(mstmm_complex_state *state, int inde
     const int nu = body->nu;
     int columns[6];
     const int speeds = mstmm_free_speeds(state->memory, body, columns);
-    if (mstmm_omitted(state->model, state->observed, index)) return 0;
+    if (mstmm_is_skipped(state->model, state->observed, index)) return 0;
     mstmm_complex_set_zero(state->answer + body->u, nu);
     if (body->placed) {
         double *block = state->workspace + body->block;

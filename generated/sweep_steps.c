@@ -364,7 +364,7 @@ static int mstmm_at_drives(mstmm_state *state, int index)
 {
     const mstmm_drive *drive = &state->model->drives[index];
     const mstmm_body *body = &state->model->bodies[drive->body];
-    if (!mstmm_imposed(body, state->memory)) return 0;
+    if (!mstmm_imposed_count(body, state->memory)) return 0;
     (mstmm_filled_q(state) + body->q + drive->coordinate)[0] = (mstmm_drive_values(state) + 3 * index)[0];
     (mstmm_filled_u(state) + body->u + drive->speed)[0] = (mstmm_drive_values(state) + 3 * index + 1)[0];
     if ((!state->given || state->residual)) {
@@ -652,7 +652,7 @@ static int mstmm_at_rotor_residual(mstmm_state *state, int index)
         (mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k)[0] = 0;
         (mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k)[0] -= lack[0];
     }
-    if (mstmm_imposed(body, state->memory)) {
+    if (mstmm_imposed_count(body, state->memory)) {
         for (int k = 0; k < body->nu; k++) {
             if (!body->imposed_mask[k]) continue;
             mstmm_frames_driven_effort(
@@ -681,7 +681,7 @@ static int mstmm_at_rotor_residual_of_tree(mstmm_state *state, int index)
         (mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k)[0] = 0;
         (mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k)[0] -= lack[0];
     }
-    if (mstmm_imposed(body, state->memory)) {
+    if (mstmm_imposed_count(body, state->memory)) {
         for (int k = 0; k < body->nu; k++) {
             if (!body->imposed_mask[k]) continue;
             mstmm_frames_driven_effort(
@@ -1358,7 +1358,7 @@ static int mstmm_at_condense_with_rows(mstmm_state *state, int index)
     int columns[6];
     const int speeds = mstmm_free_speeds(state->memory, body, columns);
     int code;
-    if (mstmm_omitted(state->model, state->observed, index)) return 0;
+    if (mstmm_is_skipped(state->model, state->observed, index)) return 0;
     if (body->modal) {
         real *modes = modal ? state->workspace + modal->place : NULL;
         code = mstmm_at_modal_condense(state, index);
@@ -1531,7 +1531,7 @@ static int mstmm_at_recover_with_rows(mstmm_state *state, int index)
     int columns[6];
     const int speeds = mstmm_free_speeds(state->memory, body, columns);
     int code;
-    if (mstmm_omitted(state->model, state->observed, index)) return 0;
+    if (mstmm_is_skipped(state->model, state->observed, index)) return 0;
     for (int c = 0; c < looped->n_pending; c++) {
         const mstmm_pending *pending = &looped->pending[c];
         if (!body->section && speeds) {
@@ -1616,7 +1616,7 @@ static int mstmm_at_recover_with_rows(mstmm_state *state, int index)
             .delta_I = block + MSTMM_BLOCK_DELTA, .delta = delta);
         memcpy(block + MSTMM_BLOCK_DELTA, delta, 6 * sizeof(real));
     }
-    if (mstmm_imposed(body, state->memory) && state->balance) {
+    if (mstmm_imposed_count(body, state->memory) && state->balance) {
         code = mstmm_at_hinge_motion(state, index);
         if (code) return code;
     }
@@ -1687,7 +1687,7 @@ static int mstmm_at_drive_power(mstmm_state *state, int index)
     const mstmm_body *body = &state->model->bodies[index];
     real *block = state->workspace + body->block;
     const int nu = body->nu;
-    if (!mstmm_imposed(body, state->memory)) return 0;
+    if (!mstmm_imposed_count(body, state->memory)) return 0;
     mstmm_frames_reaction(
         .S = block + MSTMM_BLOCK_S, .e = block + MSTMM_BLOCK_E,
         .delta = block + MSTMM_BLOCK_DELTA, .A = mstmm_identity, .f = f, .force = unused_force,
@@ -2115,7 +2115,7 @@ static int mstmm_at_coupling_loads(mstmm_state *state, int index)
     const int nu = body->nu;
     const mstmm_looped *looped = &state->model->looped[index];
     real *loops = state->workspace + state->model->loops;
-    if (mstmm_omitted(state->model, state->observed, index)) return 0;
+    if (mstmm_is_skipped(state->model, state->observed, index)) return 0;
     for (int c = 0; c < looped->n_pending; c++) {
         const mstmm_pending *pending = &looped->pending[c];
         if ((pending->tau >= 0)) {
@@ -2502,7 +2502,7 @@ static int mstmm_at_drives_slope(mstmm_state *state, int index)
 {
     const mstmm_drive *drive = &state->model->drives[index];
     const mstmm_body *body = &state->model->bodies[drive->body];
-    if (!mstmm_imposed(body, state->memory)) return 0;
+    if (!mstmm_imposed_count(body, state->memory)) return 0;
     (mstmm_filled_q(state->slope) + body->q + drive->coordinate)[0] = (mstmm_drive_values(state->slope) + 3 * index)[0];
     (mstmm_filled_u(state->slope) + body->u + drive->speed)[0] = (mstmm_drive_values(state->slope) + 3 * index + 1)[0];
     if ((!state->given || state->residual)) {
@@ -2731,7 +2731,7 @@ static int mstmm_at_coupling_loads_slope(mstmm_state *state, int index)
     real *loops = state->workspace + state->model->loops;
     real *d_block = state->slope->workspace + body->block;
     real *d_loops = state->slope->workspace + state->model->loops;
-    if (mstmm_omitted(state->model, state->observed, index)) return 0;
+    if (mstmm_is_skipped(state->model, state->observed, index)) return 0;
     for (int c = 0; c < looped->n_pending; c++) {
         const mstmm_pending *pending = &looped->pending[c];
         if ((pending->tau >= 0)) {
@@ -3634,7 +3634,7 @@ static int mstmm_at_forces_by_place(mstmm_state *state, int index)
     real d_F_back[3];
     real d_M_back[3];
     const mstmm_force *force = &state->model->forces[index];
-    const mstmm_body *body = &state->model->bodies[mstmm_held(force)];
+    const mstmm_body *body = &state->model->bodies[mstmm_force_body(force)];
     real *block = state->workspace + body->block;
     real *from = mstmm_block(state->model, state->workspace, force->body_f);
     real *to = mstmm_block(state->model, state->workspace, force->body_t);
@@ -3873,7 +3873,7 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
     int columns[6];
     const int speeds = mstmm_free_speeds(state->memory, body, columns);
     int code;
-    if (mstmm_omitted(state->model, state->observed, index)) return 0;
+    if (mstmm_is_skipped(state->model, state->observed, index)) return 0;
     if (body->modal && body->section) {
         const int nu = body->nu;
         const mstmm_modal *modal = mstmm_modal_of(body);
@@ -4092,7 +4092,7 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
         const mstmm_section *section = body->section;
         real *laid = section ? state->workspace + section->place : NULL;
         real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
-        code = mstmm_judged(state, mstmm_tangent_node(
+        code = mstmm_elimination_code(state, mstmm_tangent_node(
             .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .B = bend + MSTMM_BEND_B(n),
             .G = bend + MSTMM_BEND_G(n), .W = bend + MSTMM_BEND_W(n),
             .S = state->tangents->numbers + mstmm_carried_at(state->tangents, body),
@@ -4106,7 +4106,7 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
         real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
-        code = mstmm_judged(state, mstmm_tangent_node(
+        code = mstmm_elimination_code(state, mstmm_tangent_node(
             .n = modal->n, .H = bend + MSTMM_BEND_ZERO_H(n), .B = bend + MSTMM_BEND_B(n),
             .G = bend + MSTMM_BEND_G(n), .W = bend + MSTMM_BEND_W(n),
             .S = state->tangents->numbers + mstmm_carried_at(state->tangents, body),
@@ -4169,7 +4169,7 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
             .W = tangent + MSTMM_TANGENT_W(body->nu, body->nq),
             .S = state->tangents->numbers + mstmm_carried_at(state->tangents, body), .K = K,
             .right = right, .D = D, .one = one);
-        code = mstmm_judged(state, mstmm_tangent_invert(
+        code = mstmm_elimination_code(state, mstmm_tangent_invert(
             .n = speeds, .D = D, .one = one,
             .inverse = tangent + MSTMM_TANGENT_INVERSE(body->nu, body->nq), .work = work));
         if (code) return mstmm_fail(state, MSTMM_FAILED_TANGENT, index, code);
@@ -4253,7 +4253,7 @@ static int mstmm_at_tangent_contributions(mstmm_state *state, int index)
     int columns[6];
     const int speeds = mstmm_free_speeds(state->memory, body, columns);
     int code;
-    if (mstmm_omitted(state->model, state->observed, index)) return 0;
+    if (mstmm_is_skipped(state->model, state->observed, index)) return 0;
     if (body->modal && body->section) {
         real *block = state->workspace + body->block;
         const int nu = body->nu;
@@ -4492,7 +4492,7 @@ static int mstmm_at_tangent_backward(mstmm_state *state, int index)
     const mstmm_body *body = &state->model->bodies[index];
     int columns[6];
     const int speeds = mstmm_free_speeds(state->memory, body, columns);
-    if (mstmm_omitted(state->model, state->observed, index)) return 0;
+    if (mstmm_is_skipped(state->model, state->observed, index)) return 0;
     if (body->modal && body->section) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
@@ -4570,7 +4570,7 @@ static int mstmm_at_tangent_forward(mstmm_state *state, int index)
     const int nu = body->nu;
     int columns[6];
     const int speeds = mstmm_free_speeds(state->memory, body, columns);
-    if (mstmm_omitted(state->model, state->observed, index)) return 0;
+    if (mstmm_is_skipped(state->model, state->observed, index)) return 0;
     mstmm_set_zero(state->answer + body->u, nu);
     if (body->placed) {
         real *block = state->workspace + body->block;
@@ -4760,7 +4760,7 @@ static int mstmm_at_increment_backward(mstmm_state *state, int index)
     int columns[6];
     const int speeds = mstmm_free_speeds(state->memory, body, columns);
     int code;
-    if (mstmm_omitted(state->model, state->observed, index)) return 0;
+    if (mstmm_is_skipped(state->model, state->observed, index)) return 0;
     if (body->section) {
         real *block = state->workspace + body->block;
         const int nu = body->nu;
@@ -5013,7 +5013,7 @@ static int mstmm_at_increment_forward(mstmm_state *state, int index)
     const int nu = body->nu;
     int columns[6];
     const int speeds = mstmm_free_speeds(state->memory, body, columns);
-    if (mstmm_omitted(state->model, state->observed, index)) return 0;
+    if (mstmm_is_skipped(state->model, state->observed, index)) return 0;
     mstmm_set_zero(state->answer + body->u, nu);
     if (body->placed) {
         real *block = state->workspace + body->block;

@@ -44,7 +44,7 @@ _HELD_TANGENTS = {
 }
 _FUNCTION_NAMES = re.compile(
     r"\bmstmm_(?!tangent_at\b|modal_of\b)"
-    r"(?=(?:state|fail|judged|solve_lu|set_zero|(?:at|sweep|generic|frames|tangent|modal)_\w+)\b)"
+    r"(?=(?:state|fail|elimination_code|solve_lu|set_zero|(?:at|sweep|generic|frames|tangent|modal)_\w+)\b)"
 )
 
 #: Zero initialisations, and additions to other values.

@@ -255,7 +255,7 @@ def pass_variables(flat: bool) -> dict[str, tuple[str, tuple[str, ...]]]:
 #: C expression of the body that the subject of a pass refers to.
 BODY_OF_SUBJECT = {
     "body": "index", "law": "law->body", "drive": "drive->body", "load": "load->body",
-    "force": "mstmm_held(force)", "closure": "closure->frame",
+    "force": "mstmm_force_body(force)", "closure": "closure->frame",
 }  # fmt: skip
 
 

@@ -292,7 +292,7 @@ class StepText:
         if not step.fails:
             return [f"{indent}{call};"]
         if step.fails == "tangent":
-            call = f"mstmm_judged(state, {call})"
+            call = f"mstmm_elimination_code(state, {call})"
         return [f"{indent}code = {call};", *self._failure_lines(step.fails, indent)]
 
     def _call_head(self, step: Call, callee: Callee) -> str:

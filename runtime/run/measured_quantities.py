@@ -182,7 +182,7 @@ class MeasuredQuantities:
         """
         values, state = np.zeros(max(1, self.numbers)), np.ascontiguousarray(y)
         pointers = self._engine.pointer(state), self._engine.pointer(values)
-        if self._engine.lib.mstmm_measured(run, self.record, t, *pointers):
+        if self._engine.lib.mstmm_evaluate_measure(run, self.record, t, *pointers):
             raise NumericalFailure(self._engine.failure_text(run.failure, t))
         return values[: self.numbers]
 

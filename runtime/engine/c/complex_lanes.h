@@ -147,7 +147,7 @@ MSTMM_COMPLEX int mstmm_complex_fail(mstmm_complex_state *state, int reason, int
 }
 
 /* The code of an elimination: determinants have no sign here. */
-#define mstmm_complex_judged(state, code) (code)
+#define mstmm_complex_elimination_code(state, code) (code)
 
 #endif
 #endif

@@ -6,8 +6,8 @@
 
 static const real SAME = 1e-9; /* of a sample time: a time so near to a sample is the sample */
 
-int mstmm_measured(mstmm_scene_run *run, const mstmm_measure *measure, real t, const real *y,
-                   real *numbers)
+int mstmm_evaluate_measure(mstmm_scene_run *run, const mstmm_measure *measure, real t,
+                           const real *y, real *numbers)
 {
     const mstmm_model *model = run->model;
     const mstmm_observation *shown = &measure->shown;
@@ -86,7 +86,7 @@ int mstmm_controllers_act(mstmm_scene_run *run, real t, const real *y)
     for (int k = 0; k < run->n_controllers; k++) {
         const mstmm_controller *one = &run->controllers[k];
         if (!is_due(one, run->memory + one->memory, t)) continue;
-        const int code = mstmm_measured(run, one->measure, t, y, one->y);
+        const int code = mstmm_evaluate_measure(run, one->measure, t, y, one->y);
         if (code) return code;
         if (!all_finite(one->n_y, one->y)) return note_controller_failure(run, k);
         due = 1;

@@ -15,8 +15,8 @@ typedef struct mstmm_measure {
 
 /* The numbers of a state (t, y) of a scene's run, with what the run's memory holds.  0, or a
  * reason, with the run's `failure` filled. */
-int mstmm_measured(mstmm_scene_run *run, const mstmm_measure *measure, real t, const real *y,
-                   real *numbers);
+int mstmm_evaluate_measure(mstmm_scene_run *run, const mstmm_measure *measure, real t,
+                           const real *y, real *numbers);
 
 /* Linear in discrete time: at t_k = k sample_time, with e = y - reference,
  *   u = C x + D e + offset, held from t_k on;  x <- A x + B e.

@@ -56,7 +56,7 @@ real mstmm_coupling_lack(const mstmm_state *state, const mstmm_coupling *one)
     return loop_numbers(state)[one->numbers + known_number_index(state)];
 }
 
-void mstmm_uncoupled(const mstmm_state *state, int index, real *efforts)
+void mstmm_efforts_without_couplings(const mstmm_state *state, int index, real *efforts)
 {
     const mstmm_looped *looped = &state->model->looped[index];
     const int nu = state->model->bodies[index].nu;

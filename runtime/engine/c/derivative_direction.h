@@ -6,12 +6,13 @@
 #include "sweep.h"
 
 /* The derivatives' arrays are those of the caller of a sweep, who may write them. */
-static inline real *mstmm_aimed(const real *array) { return (real *)array; }
+static inline real *mstmm_writable(const real *array) { return (real *)array; }
 
 static inline void mstmm_aim_nowhere(mstmm_state *state, const mstmm_body *body)
 {
-    real *q = mstmm_aimed(state->slope->q) + body->q, *u = mstmm_aimed(state->slope->u) + body->u;
-    real *given = mstmm_aimed(state->slope->given) + body->u;
+    real *q = mstmm_writable(state->slope->q) + body->q,
+         *u = mstmm_writable(state->slope->u) + body->u;
+    real *given = mstmm_writable(state->slope->given) + body->u;
     mstmm_set_zero(q, body->nq);
     mstmm_set_zero(u, body->nu);
     mstmm_set_zero(given, body->nu);
@@ -21,23 +22,23 @@ static inline void mstmm_aim_nowhere(mstmm_state *state, const mstmm_body *body)
 static inline void mstmm_aim_coordinate(mstmm_state *state, const mstmm_body *body, int i)
 {
     mstmm_aim_nowhere(state, body);
-    mstmm_aimed(state->slope->q)[body->q + i] = 1;
+    mstmm_writable(state->slope->q)[body->q + i] = 1;
 }
 
 static inline void mstmm_aim_rate(mstmm_state *state, const mstmm_body *body, int j)
 {
     mstmm_aim_nowhere(state, body);
-    mstmm_aimed(state->slope->u)[body->u + j] = 1;
+    mstmm_writable(state->slope->u)[body->u + j] = 1;
 }
 
 /* A speed, the acceleration and the change of the coordinates that come with it in a step. */
 static inline void mstmm_aim_unknown(mstmm_state *state, const mstmm_body *body, int j)
 {
     const mstmm_tangents *step = state->tangents;
-    real *q = mstmm_aimed(state->slope->q) + body->q;
+    real *q = mstmm_writable(state->slope->q) + body->q;
     mstmm_aim_rate(state, body, j);
-    mstmm_aimed(state->slope->u)[body->u + j] = step->rate;
-    mstmm_aimed(state->slope->given)[body->u + j] = step->s;
+    mstmm_writable(state->slope->u)[body->u + j] = step->rate;
+    mstmm_writable(state->slope->given)[body->u + j] = step->s;
     if (body->straight) {
         q[j] = 1 / step->sq;
     } else {
@@ -57,18 +58,18 @@ static inline int mstmm_law_ignores(const mstmm_body *body, const mstmm_law *law
 static inline void mstmm_aim_no_mode(mstmm_state *state, const mstmm_modal *modal)
 {
     for (int i = 0; i < modal->n; i++) {
-        mstmm_aimed(state->slope->q)[modal->q + i] = 0;
-        mstmm_aimed(state->slope->u)[modal->u + i] = 0;
-        mstmm_aimed(state->slope->given)[modal->u + i] = 0;
+        mstmm_writable(state->slope->q)[modal->q + i] = 0;
+        mstmm_writable(state->slope->u)[modal->u + i] = 0;
+        mstmm_writable(state->slope->given)[modal->u + i] = 0;
     }
 }
 
 static inline void mstmm_aim_mode(mstmm_state *state, const mstmm_modal *modal, int i)
 {
     mstmm_aim_no_mode(state, modal);
-    mstmm_aimed(state->slope->q)[modal->q + i] = 1 / state->tangents->sq;
-    mstmm_aimed(state->slope->u)[modal->u + i] = state->tangents->rate;
-    mstmm_aimed(state->slope->given)[modal->u + i] = state->tangents->s;
+    mstmm_writable(state->slope->q)[modal->q + i] = 1 / state->tangents->sq;
+    mstmm_writable(state->slope->u)[modal->u + i] = state->tangents->rate;
+    mstmm_writable(state->slope->given)[modal->u + i] = state->tangents->s;
 }
 
 /* Entry k of a motion, none for -1. */
@@ -78,7 +79,7 @@ static inline void mstmm_aim_motion(real *motion, int k)
 }
 
 /* Code of an elimination: a negative determinant is no failure if it is counted. */
-static inline int mstmm_judged(mstmm_state *state, int code)
+static inline int mstmm_elimination_code(mstmm_state *state, int code)
 {
     if (code != MSTMM_NEGATIVE || !state->tangents->negative) return code;
     *state->tangents->negative = !*state->tangents->negative;
@@ -86,7 +87,7 @@ static inline int mstmm_judged(mstmm_state *state, int code)
 }
 
 /* The body of an element that has an end on the ground. */
-static inline int mstmm_held(const mstmm_force *force)
+static inline int mstmm_force_body(const mstmm_force *force)
 {
     return force->body_f < 0 && force->body_t >= 0 ? force->body_t : force->body_f;
 }

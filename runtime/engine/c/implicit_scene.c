@@ -191,7 +191,7 @@ static int looped_impose(void *context, double t, double *y, double *a)
     for (int k = 0; k < model->n_drives; k++) {
         const mstmm_drive *drive = &model->drives[k];
         const mstmm_body *body = &model->bodies[drive->body];
-        if (mstmm_imposed(body, run->memory))
+        if (mstmm_imposed_count(body, run->memory))
             a[body->u + drive->speed] = mstmm_drive_values(&state)[3 * k + 2];
     }
     return 0;

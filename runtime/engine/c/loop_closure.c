@@ -42,9 +42,10 @@ int mstmm_hook_begin_rows(mstmm_state *state)
     memset(first, 0, (size_t)(end - first) * sizeof(real));
     for (int r = 0; r < model->n_rows; r++) {
         const mstmm_loop_row *row = &model->rows[r];
-        row_numbers(state, r)[MSTMM_ROW_PIVOT] = is_released(state, row) || mstmm_rests(state, row)
-                                                     ? (real)INFINITY
-                                                     : row->softness + state->give * row->mobility;
+        row_numbers(state, r)[MSTMM_ROW_PIVOT] =
+            is_released(state, row) || mstmm_is_row_inactive(state, row)
+                ? (real)INFINITY
+                : row->softness + state->give * row->mobility;
     }
     return model->n_couplings ? mstmm_hook_evaluate_couplings(state) : 0;
 }
@@ -56,8 +57,8 @@ int mstmm_hook_set_row_targets(mstmm_state *state)
     return 0;
 }
 
-int mstmm_stressed(const mstmm_model *model, real *workspace, real give, const real *asked,
-                   const real *q, const real *memory, real *multipliers, mstmm_failure *failure)
+int mstmm_self_stress(const mstmm_model *model, real *workspace, real give, const real *asked,
+                      const real *q, const real *memory, real *multipliers, mstmm_failure *failure)
 {
     mstmm_state state = {.model = model,
                          .workspace = workspace,
@@ -186,9 +187,9 @@ int mstmm_fill_driven(const mstmm_model *model, real *workspace, real t, real *q
     return 0;
 }
 
-int mstmm_moved(const mstmm_model *model, real *workspace, real t, real *q, const real *change,
-                const real *memory, int n_quaternions, const int *quaternions,
-                mstmm_failure *failure)
+int mstmm_move_positions(const mstmm_model *model, real *workspace, real t, real *q,
+                         const real *change, const real *memory, int n_quaternions,
+                         const int *quaternions, mstmm_failure *failure)
 {
     mstmm_state state = {.model = model,
                          .workspace = workspace,
@@ -274,8 +275,8 @@ static int looped_gaps(void *context, mstmm_gaps *found)
     if (code) return code;
     found->met = largest_row_error(&state, 0, &found->where_met);
     found->repeated = largest_row_error(&state, 1, &found->where_repeated);
-    return mstmm_moved(at->model, at->workspace, at->t, at->q, at->change, at->memory,
-                       at->n_quaternions, at->quaternions, at->failure);
+    return mstmm_move_positions(at->model, at->workspace, at->t, at->q, at->change, at->memory,
+                                at->n_quaternions, at->quaternions, at->failure);
 }
 
 static int looped_slips(void *context)
@@ -287,7 +288,7 @@ static int looped_slips(void *context)
     return code;
 }
 
-int mstmm_closed(const mstmm_closing *by, const mstmm_model *model, mstmm_failure *failure)
+int mstmm_remove_gaps(const mstmm_closing *by, const mstmm_model *model, mstmm_failure *failure)
 {
     const real close = model->refines || by->near ? CLOSE_REFINED : CLOSE;
     const int slips = !by->slips ? 0 : model->refines || by->near ? SLIPS_REFINED : 1;
@@ -319,5 +320,5 @@ int mstmm_close_loops(const mstmm_model *model, real *workspace, real t, real *q
                        memory, n_quaternions, quaternions, failure};
     const int near = model->strained >= 0 && memory[model->strained] > 0;
     const mstmm_closing by = {&at, looped_gaps, gaps_alone ? NULL : looped_slips, near};
-    return mstmm_closed(&by, model, failure);
+    return mstmm_remove_gaps(&by, model, failure);
 }

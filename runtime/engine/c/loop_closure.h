@@ -19,7 +19,7 @@ void mstmm_missing(const mstmm_state *state, real *missing);
 /* Error of a coupling in the last sweep; 0 if it is inactive. */
 real mstmm_coupling_lack(const mstmm_state *state, const mstmm_coupling *one);
 /* Efforts of the hinge of a body without those of couplings. */
-void mstmm_uncoupled(const mstmm_state *state, int index, real *efforts);
+void mstmm_efforts_without_couplings(const mstmm_state *state, int index, real *efforts);
 /* Quaternions in q, by the first entry of each, brought back to length 1. */
 void mstmm_unit_quaternions(int count, const int *first, real *q);
 
@@ -40,6 +40,6 @@ typedef struct {
 } mstmm_closing;
 
 /* Gaps and velocity errors removed to the accuracy of the model. */
-int mstmm_closed(const mstmm_closing *by, const mstmm_model *model, mstmm_failure *failure);
+int mstmm_remove_gaps(const mstmm_closing *by, const mstmm_model *model, mstmm_failure *failure);
 
 #endif

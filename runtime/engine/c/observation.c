@@ -80,7 +80,7 @@ static void observe_hinges(const mstmm_state *state, const real *udot,
         mstmm_generic_effort(body->nu, .H = mstmm_of_speeds(block, body->nu, MSTMM_SPEED_H),
                              .f = load, .tau = efforts);
         for (int j = 0; j < body->nu; j++) efforts[j] += body->rotor[j] * udot[body->u + j];
-        if (model->n_couplings) mstmm_uncoupled(state, i, efforts);
+        if (model->n_couplings) mstmm_efforts_without_couplings(state, i, efforts);
     }
 }
 

@@ -73,7 +73,7 @@ static int is_unknown(const mstmm_tangent *at, int k)
     if (one->speed < 0)
         return mstmm_row_numbers(at->model, at->workspace, one->row)[MSTMM_ROW_INVERSE] > 0;
     const mstmm_body *body = &at->model->bodies[one->frame];
-    return !(mstmm_imposed(body, at->memory) && body->imposed_mask[one->direction]);
+    return !(mstmm_imposed_count(body, at->memory) && body->imposed_mask[one->direction]);
 }
 
 /* Change number k of loads and efforts, in the derivatives' workspace. */

@@ -114,7 +114,7 @@ const real *mstmm_row_floor(mstmm_state *state, const mstmm_loop_row *row)
     return &row->floor;
 }
 
-int mstmm_rests(const mstmm_state *state, const mstmm_loop_row *row)
+int mstmm_is_row_inactive(const mstmm_state *state, const mstmm_loop_row *row)
 {
     return !state->chosen && row->rest >= 0 && state->memory[row->rest] > 0;
 }

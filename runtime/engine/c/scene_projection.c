@@ -79,7 +79,7 @@ static int close_loops(mstmm_scene_run *run, double t, double *y)
     mstmm_renew_inputs(&run->live, t, run->memory, run->fused_p);
     const int near = model->strained >= 0 && run->memory[model->strained] > 0;
     const mstmm_closing by = {&at, compiled_gaps, run->on_positions ? NULL : compiled_slips, near};
-    return mstmm_closed(&by, model, &run->failure);
+    return mstmm_remove_gaps(&by, model, &run->failure);
 }
 
 int mstmm_scene_close_loops(mstmm_scene_run *run, double t, double *y)

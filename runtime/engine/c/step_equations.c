@@ -12,7 +12,7 @@ static real power_of_imposed(const mstmm_state *state, const real *required)
     real power = 0;
     for (int i = 0; model->n_imposed && i < model->n_bodies; i++) {
         const mstmm_body *body = &model->bodies[i];
-        if (!mstmm_imposed(body, state->memory)) continue;
+        if (!mstmm_imposed_count(body, state->memory)) continue;
         for (int j = body->u; j < body->u + body->nu; j++)
             if (body->imposed_mask[j - body->u]) power += required[j] * state->u[j];
     }

@@ -342,15 +342,15 @@ int mstmm_correction(const mstmm_model *model, real *workspace, int level, real 
 /* Multipliers (n_rows) of rows with errors `asked` and a compliance of `give` times their
  * mobility, at rest: with a small compliance only those of self-stress states remain.  Their loads
  * stay in the workspace. */
-int mstmm_stressed(const mstmm_model *model, real *workspace, real give, const real *asked,
-                   const real *q, const real *memory, real *multipliers, mstmm_failure *failure);
+int mstmm_self_stress(const mstmm_model *model, real *workspace, real give, const real *asked,
+                      const real *q, const real *memory, real *multipliers, mstmm_failure *failure);
 /* Sets driven coordinates and speeds in place. */
 int mstmm_fill_driven(const mstmm_model *model, real *workspace, real t, real *q, real *u,
                       const real *memory, mstmm_failure *failure);
 /* Moves q by a change along the speeds, in place. */
-int mstmm_moved(const mstmm_model *model, real *workspace, real t, real *q, const real *change,
-                const real *memory, int n_quaternions, const int *quaternions,
-                mstmm_failure *failure);
+int mstmm_move_positions(const mstmm_model *model, real *workspace, real t, real *q,
+                         const real *change, const real *memory, int n_quaternions,
+                         const int *quaternions, mstmm_failure *failure);
 /* Chooses the satisfied ones of interchangeable redundant rows and writes that to `memory`: an
  * existing choice is kept while it is not much worse than the best.  *changed: whether the choice
  * is new. */
@@ -372,7 +372,7 @@ int64_t mstmm_section_numbers(int n);
 #define mstmm_block(model, workspace, body)                                                        \
     ((workspace) + ((body) < 0 ? 0 : (model)->bodies[body].block))
 
-static inline int mstmm_imposed(const mstmm_body *body, const real *memory)
+static inline int mstmm_imposed_count(const mstmm_body *body, const real *memory)
 {
     if (body->n_imposed == 0) return 0;
     return body->release < 0 || !(fabs(memory[body->release]) > 0) ? body->n_imposed : 0;
@@ -499,7 +499,7 @@ static inline int mstmm_idle(int observed, const mstmm_body *body)
 }
 
 /* True if the sweep from tips to root skips this body. */
-static inline int mstmm_omitted(const mstmm_model *model, int observed, int index)
+static inline int mstmm_is_skipped(const mstmm_model *model, int observed, int index)
 {
     return (model->looped && model->looped[index].closure) ||
            mstmm_idle(observed, &model->bodies[index]);
@@ -516,7 +516,7 @@ static inline int mstmm_modes_of(const mstmm_modal *modal) { return modal ? moda
 /* Number of the free speeds of a hinge, and their indices. */
 static inline int mstmm_free_speeds(const real *memory, const mstmm_body *body, int *columns)
 {
-    const int imposed = mstmm_imposed(body, memory);
+    const int imposed = mstmm_imposed_count(body, memory);
     int n = 0;
     for (int j = 0; j < body->nu; j++)
         if (!imposed || !body->imposed_mask[j]) columns[n++] = j;
@@ -532,7 +532,7 @@ static inline real mstmm_value_at(const mstmm_state *state, int place)
  * if there is none yet. */
 const real *mstmm_row_floor(mstmm_state *state, const mstmm_loop_row *row);
 /* True if a row is replaced by others of its choice. */
-int mstmm_rests(const mstmm_state *state, const mstmm_loop_row *row);
+int mstmm_is_row_inactive(const mstmm_state *state, const mstmm_loop_row *row);
 
 /* Effort by expression of a force element, from its length and rate. */
 int mstmm_given_effort(mstmm_state *state, const mstmm_tape *effort, const real *length,

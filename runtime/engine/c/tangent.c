@@ -80,7 +80,7 @@ void mstmm_tangent_free(const mstmm_tangent *at, real *entries)
     const mstmm_model *model = at->model;
     for (int i = 0; model->n_imposed && i < model->n_bodies; i++) {
         const mstmm_body *body = &model->bodies[i];
-        if (!mstmm_imposed(body, at->memory)) continue;
+        if (!mstmm_imposed_count(body, at->memory)) continue;
         for (int j = 0; j < body->nu; j++)
             if (body->imposed_mask[j]) entries[body->u + j] = 0;
     }
@@ -115,7 +115,7 @@ static void clear_imposed_coordinates(const mstmm_model *model, const real *memo
 {
     for (int i = 0; model->n_imposed && i < model->n_bodies; i++) {
         const mstmm_body *body = &model->bodies[i];
-        if (!mstmm_imposed(body, memory)) continue;
+        if (!mstmm_imposed_count(body, memory)) continue;
         if (body->n_imposed == body->nu)
             memset(dq + body->q, 0, (size_t)body->nq * sizeof(real));
         else /* rates are speeds where some of them alone are driven */
@@ -158,7 +158,7 @@ int mstmm_tangent_rates(mstmm_tangent *at, const real *q, const real *u, real *d
 static int iterate_coordinates(mstmm_state *state, const mstmm_tangent *at, const mstmm_body *body,
                                int i)
 {
-    real *d_q = mstmm_aimed(state->slope->q) + body->q, *dq = state->tangents->change + body->q;
+    real *d_q = mstmm_writable(state->slope->q) + body->q, *dq = state->tangents->change + body->q;
     int code = 0;
     for (int round = 0; !code && round < (at->kappa > 0 ? 2 : 1); round++) {
         code = mstmm_at_rates_change(state, i);

@@ -101,7 +101,7 @@ class LoopCalls(LoopWorkspace):
         """Multipliers (rows,) of rows with errors `errors` and compliance `give`; see sweep.h."""
         engine, multipliers = self.engine, np.zeros(max(1, self.count))
         failure = engine.ffi.new("mstmm_failure *")
-        code = engine.lib.mstmm_stressed(
+        code = engine.lib.mstmm_self_stress(
             self.model, engine.workspace(), give, engine.pointer(errors), engine.pointer(q),
             engine.pointer(self.memory), engine.pointer(multipliers), failure,
         )  # fmt: skip
@@ -113,7 +113,7 @@ class LoopCalls(LoopWorkspace):
         """Move q (nq,) by a change along the speeds (nu,)."""
         engine, q_moved, t = self.engine, q.copy(), self.t
         failure = engine.ffi.new("mstmm_failure *")
-        code = engine.lib.mstmm_moved(
+        code = engine.lib.mstmm_move_positions(
             self.model, engine.workspace(), t, engine.pointer(q_moved), engine.pointer(change),
             engine.pointer(self.memory), len(self._quaternions) - 1,
             engine.ffi.from_buffer("int[]", self._quaternions), failure,

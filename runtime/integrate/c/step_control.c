@@ -49,7 +49,7 @@ static void aim_fixed(mstmm_run *run, double stop, int is_break)
 
 /* h, or the longest step that max_step and the bounds allow: one that ends before a shorter bound
  * begins, or is no longer than it. */
-static double allowed(mstmm_run *run, double h)
+static double longest_step(mstmm_run *run, double h)
 {
     int64_t *i = &run->count.bound_index;
     const double t = run->real.t;
@@ -65,7 +65,7 @@ static double allowed(mstmm_run *run, double h)
 static void aim_adaptive(mstmm_run *run, double stop, int is_break)
 {
     const double wanted = fmax(run->real.h_next, mstmm_smallest_step(run));
-    const double most = allowed(run, STRETCH * wanted), h = fmin(wanted, most);
+    const double most = longest_step(run, STRETCH * wanted), h = fmin(wanted, most);
     const int reaches = run->real.t + most >= stop;
     run->real.t_new = reaches ? stop : run->real.t + h;
     run->count.lands_on_break = reaches && is_break;
