@@ -17,7 +17,7 @@ import mstmm.templates
 from mstmm.abi.fused_library import ABI_VERSION, COMPILER_FLAGS, DECLARATIONS, SYMBOL
 from mstmm.ir import Element, KernelIR, Operand
 
-from ..fuse.optimisation.instruction_scheduling import interleave, thrifty
+from ..fuse.optimisation.instruction_scheduling import interleave, order_for_registers
 from ..fuse.optimisation.sincos_pairing import Angle, gather
 from .function_splitting import MAX_UNSPLIT_SIZE, FunctionParts, statement_text
 from .guard_text import Guards
@@ -144,7 +144,9 @@ def function_text(kernel: KernelIR, name: str, dialect: Dialect) -> str:
     text = StraightText(kernel, dialect)
     schedule = gather(kernel.statements)
     is_short = not dialect.vector and kernel.flops() <= _MAX_INTERLEAVED_FLOPS
-    statements = interleave(schedule.remaining) if is_short else thrifty(schedule.remaining)
+    statements = (
+        interleave(schedule.remaining) if is_short else order_for_registers(schedule.remaining)
+    )
     guards = Guards(text)
     parts = (
         FunctionParts(text, name, schedule.defined_temporaries(), statements, guards)

@@ -315,7 +315,7 @@ def _kernel_view(
         + ([] if outputs else ["out"]),
         "statements": statements,
         "negative": NEGATIVE_DETERMINANT,
-        "judged": solved_outputs,
+        "solved_outputs": solved_outputs,
         "guards": [{"code": code, "message": string_literal(message)} for code, message in guards],
         "hash": kernel.hash(),
     }

@@ -45,12 +45,12 @@ _PART = re.compile(r"[^.\[\]]+|\[\d+\]")
 
 
 def parameter_derivatives(
-    scene: Scene, known: Known, names: Sequence[str], judged: PackedScene | None = None
+    scene: Scene, known: Known, names: Sequence[str], reference: PackedScene | None = None
 ) -> tuple[Structure, Array, Array]:
     """(structure, p, dp/dnames) with p (np,) and its derivatives (np, names).
 
     The structure is that of the scene, except that structural zeros and axes that depend on a named
-    parameter become entries of p.  `judged` supplies the independent rows of closed loops.
+    parameter become entries of p.  `reference` supplies the independent rows of closed loops.
     Raises SceneError for unknown names, and for parameters of flexible bodies.
     """
     reject_folded_parameters(scene, names, "exact derivative; take a difference of two models")
@@ -59,9 +59,9 @@ def parameter_derivatives(
         return Dual(value_of(value), {**getattr(value, "slope", {}), k: 1.0})
 
     system, _ = seed_derivatives(scene, known, names, dual)
-    if judged is not None:
-        system = _with_rows(system, judged.system)
-    floors = [] if judged is None else judged.floors
+    if reference is not None:
+        system = _with_rows(system, reference.system)
+    floors = [] if reference is None else reference.floors
     structure, numbers = structure_and_numbers(system, known, floors=floors)
     values = np.array([value_of(x) for x in numbers])
     derivatives = np.zeros((len(numbers), len(names)))
@@ -72,11 +72,11 @@ def parameter_derivatives(
     return structure, values, derivatives
 
 
-def _with_rows(system: System, judged: System) -> System:
+def _with_rows(system: System, reference: System) -> System:
     """System with the constraint rows of another one."""
-    pairs = zip(system.closures, judged.closures, strict=True)
+    pairs = zip(system.closures, reference.closures, strict=True)
     closures = tuple(replace(closure, directions=other.directions) for closure, other in pairs)
-    return replace(system, closures=closures, couplings=judged.couplings)
+    return replace(system, closures=closures, couplings=reference.couplings)
 
 
 def seed_derivatives(

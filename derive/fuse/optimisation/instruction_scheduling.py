@@ -97,13 +97,13 @@ def _latency(unit: Sequence[Line]) -> int:
 _REGISTER_WINDOW = 60
 
 
-def thrifty(statements: Sequence[Line]) -> list[Line]:
-    """Same statements with last readers of a value early; dependencies are kept."""
+def order_for_registers(statements: Sequence[Line]) -> list[Line]:
+    """Order statements so that few values are alive at a time; dependencies are kept."""
     units = units_of(statements)
-    return [statement for k in _thrifty_order(reads_of(units)) for statement in units[k]]
+    return [statement for k in _register_order(reads_of(units)) for statement in units[k]]
 
 
-def _thrifty_order(dependencies: Sequence[set[int]]) -> list[int]:
+def _register_order(dependencies: Sequence[set[int]]) -> list[int]:
     """Order of units: in the window, the first computable one with the largest gain."""
     readers: list[list[int]] = [[] for _ in dependencies]
     for k, reads in enumerate(dependencies):

@@ -91,7 +91,7 @@ _QUARTER_SINE = (0.0, 1.0, 0.0, -1.0)
 
 @dataclass(frozen=True)
 class _Eigenfunction:
-    """Eigenfunction on start <= x <= end (m), zero outside, over xi = 0..1 from its fixed end."""
+    """Function of xi = 0..1 on start <= x <= end (m), zero outside; `mirrored`: xi from `end`."""
 
     kind: str
     number: int

@@ -28,7 +28,7 @@ from mstmm.safe_text import abbreviate_names
 from .blades import find_blades
 from .displacements import displacements
 from .frame_transform import FrameTransform
-from .later_equations import SAME, later, later_state
+from .later_equations import SAME, later_equations, later_state
 
 if TYPE_CHECKING:
     from ..linear_equations import LinearEquations
@@ -56,7 +56,7 @@ def fixed_frame_transform(linear: LinearEquations) -> FrameTransform:
 
     Raises SceneError with the reason where the rotor is not axisymmetric.
     """
-    there = later(linear)
+    there = later_equations(linear)
     dt = there.state.t - linear.state.t
     blades, rates = find_blades(linear), np.zeros((len(linear), len(linear)))
     is_outside_blades = np.ones(len(linear), dtype=bool)
@@ -96,7 +96,7 @@ def _later_rotation(
 
 def _check_constant_matrices(linear: LinearEquations) -> None:
     """Raise SceneError where the matrices of y change along the motion."""
-    there = later(linear)
+    there = later_equations(linear)
     scale = 1 / np.sqrt(np.abs(np.diag(linear.M)))
     mass, stiff = (_largest(matrix, scale) for matrix in (linear.M, linear.K))
     assert linear.frame_transform is not None

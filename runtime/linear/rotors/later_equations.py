@@ -22,7 +22,7 @@ SAME = 1e-6
 _AHEAD = 0.1
 
 
-def later(linear: LinearEquations) -> LinearEquations:
+def later_equations(linear: LinearEquations) -> LinearEquations:
     """Linear equations at the later state of the motion."""
     return equations_at(linear, later_state(linear))
 

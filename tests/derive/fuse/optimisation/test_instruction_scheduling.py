@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import pytest
 
-from mstmm.derive.fuse.optimisation.instruction_scheduling import interleave, thrifty
+from mstmm.derive.fuse.optimisation.instruction_scheduling import interleave, order_for_registers
 from mstmm.derive.fuse.optimisation.sincos_pairing import gather
 from mstmm.derive.fuse.optimisation.statement_units import Line, operands
 from mstmm.ir import Assign, Guard, KernelIR, Port, Store, Temporary
@@ -20,7 +20,9 @@ def lines(kernel: KernelIR) -> list[Line]:
 
 
 Order = Callable[[Sequence[Line]], list[Line]]
-ORDERS = pytest.mark.parametrize("order", [interleave, thrifty])
+ORDERS = pytest.mark.parametrize(
+    "order", [interleave, order_for_registers], ids=["interleave", "thrifty"]
+)
 
 
 @ORDERS
@@ -93,4 +95,4 @@ def test_values_that_can_be_used_up_are() -> None:
     kernel = graph.kernel("sum", [Port("x", (40,))], [Port("y")], {"y": total})
     wide = sorted(lines(kernel), key=lambda s: not (isinstance(s, Assign) and s.op == "mul"))
     assert most_alive(wide) >= 20
-    assert most_alive(thrifty(wide)) <= 4
+    assert most_alive(order_for_registers(wide)) <= 4
