@@ -16,6 +16,7 @@ from mstmm.expression.inputs import INPUTS
 
 from ..engine.engine_calls import Probe
 from ..engine.looped_engine import LoopedEngine
+from ..engine.state_evaluation.kinematics import point_motions
 from ..kernels.tape_kernel import TapeKernel
 from ..packing.expression_tapes import constant_kernel
 from ..packing.scene_packing import packed_system
@@ -134,9 +135,9 @@ def bushing_deflection(engine: LoopedEngine, bushing: ForceNumbers, state: State
 
 
 def _observed_points(engine: LoopedEngine, probes: list[Probe], state: State) -> Array:
-    """Values (probes, 24) of `Observation.points` at a state."""
-    observations = engine.observe(
-        np.array([state.t]), state.q[None], state.u[None], engine.start_memory()[None], probes,
-        parts=("points",),
-    )  # fmt: skip
-    return observations.points[0]
+    """Motion (probes, 24) of points at a state, in the form of `Observation.points`.
+
+    The opened tree of a closed loop may have bodies without inertia, so that its accelerations
+    are undetermined; kinematics alone need none.
+    """
+    return point_motions(engine, probes, state.q, state.u, state.udot)

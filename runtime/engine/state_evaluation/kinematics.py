@@ -307,6 +307,21 @@ class _LoopedPointsRecord:
         )
 
 
+def point_motions(
+    engine: LoopedEngine, probes: Sequence[Probe], q: Array, u: Array, udot: Array
+) -> Array:
+    """Motion (k, 24) of k points in one state, also where no accelerations can be determined."""
+    record = _KinematicsRecord(engine)
+    motions = np.empty((len(probes), int(engine.lib.MSTMM_PROBE_NUMBERS)))
+    pointers = [engine.pointer(np.ascontiguousarray(x, dtype=np.float64)) for x in (q, u, udot)]
+    if engine.lib.mstmm_moving_points(
+        record.record, 1, *pointers, len(probes), engine.probes(probes), engine.pointer(motions),
+        record.failure,
+    ):  # fmt: skip
+        raise NumericalFailure(engine.failure_text(record.failure, 0.0))
+    return motions
+
+
 def _fill_record(record: Any, engine: LoopedEngine, workspace: Any) -> list[Any]:
     """Fill an `mstmm_kinematics` record; returns the memory to which it points."""
     arrays = engine.start_memory(), np.zeros(engine.nu), np.empty(engine.nu)

@@ -14,7 +14,7 @@ from tests.reference.jets import Array
 from tests.support import planar_four_bar as planar
 from tests.support.models import compile_scene
 from tests.support.scenes.linkages import OBLIQUE, bricard, cranks, four_bar, legs
-from tests.support.scenes.published_mechanisms import four_bars
+from tests.support.scenes.published_mechanisms import andrews, four_bars
 
 #: Springs, dampers and rotors in all hinges of the four-bar, without friction.
 LAWS: dict[str, dict[str, Any]] = {
@@ -76,6 +76,28 @@ def test_cutting_another_hinge_changes_nothing(cut: str) -> None:
     moving = here.modes().kinetic_energy_shares()
     for parts in (energies, moving):
         assert worst(np.sum(list(parts.values()), axis=0), np.ones(1)) < 1e-12
+
+
+def test_springs_of_a_tree_that_has_no_inertia_when_opened() -> None:
+    """Andrews' mechanism: spring and damper act along the length, by central differences of it."""
+    scene = andrews()
+    (spring,) = scene["spring"]
+    stiffness, damping, size = spring["law"]["stiffness"], 3.0, 1e-5
+    linear = compile_scene(
+        scene | {"spring": [spring | {"law": spring["law"] | {"damping": damping}}]}
+    ).linearize()
+    (spring_end,) = (spring[key] for key in ("from", "to") if spring[key] != "ground")
+    model = compile_scene(scene)
+    assert linear.constrained_motion is not None
+    motion, q = linear.constrained_motion.motion_basis[:, 0], linear.state.q
+
+    def length(x: float) -> float:
+        point = model.positions(model.assemble(q + x * motion)[0], spring_end)
+        return float(np.linalg.norm(point - spring["position"]))
+
+    slope = (length(size) - length(-size)) / (2 * size)
+    np.testing.assert_allclose(linear.K_elastic, stiffness * slope**2, rtol=1e-6)
+    np.testing.assert_allclose(linear.C_damping, damping * slope**2, rtol=1e-6)
 
 
 @pytest.fixture(scope="module")
