@@ -46,15 +46,14 @@ if TYPE_CHECKING:
     from .runtime.model.target_error.error_request import ErrorRequest
     from .runtime.result.result import Result
     from .scene import Scene
-    from .scene.load import load_scene
-    from .scene.robots.formats import import_robot
+    from .scene.load import import_robot, load_scene
     from .scene.robots.robot_from_scene import export_robot
 
 #: Public name -> (module, name there; "" for the module itself).
 _LAZY = {
     "Scene": (".scene", "Scene"),
     "load_scene": (".scene.load", "load_scene"),
-    "import_robot": (".scene.robots.formats", "import_robot"),
+    "import_robot": (".scene.load", "import_robot"),
     "export_robot": (".scene.robots.robot_from_scene", "export_robot"),
     "advise": (".pipeline.advise", "advise"),
     "chart": (".pipeline.chart", "chart"),

@@ -16,7 +16,7 @@ from tests.changed import find_tests
         ("runtime/integrate/c/simd_lanes.c", "tests/runtime/integrate/c/test_simd_lanes.py"),
         ("tests/test_changed.py", "tests/test_changed.py"),
         ("docs/howto/plots.md", "tests/system/docs"),
-        ("mstmm/scene/tables/external/no_such_file.py", "tests/mstmm/scene"),
+        ("mstmm/scene/tables/no_such_file.py", "tests/mstmm/scene/tables"),
     ],
 )
 def test_find_tests_a_file(path: str, expected: str) -> None:

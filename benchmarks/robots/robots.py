@@ -20,7 +20,7 @@ import pinocchio as pin
 import mstmm
 from mstmm.scene.robots.robot_model import Robot
 from mstmm.scene.robots.scene_from_robot import ImportedRobot, ImportOptions, scene_from_robot
-from mstmm.scene.robots.urdf_reader import read_urdf
+from mstmm.scene.robots.urdf import read_urdf
 
 #: Name -> end of the path of the file, and type of the root joint.
 ROBOTS = {

@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-from .files.read import read_tables
+from .files import read_tables
 from .load import load_scene
 from .scene import Scene
-from .tables.beam import Beam
-from .tables.beam_keys import Modes, Section, Shapes
+from .tables.beam import Beam, Modes, Section, Shapes
 from .tables.body import Body, End
 from .tables.bushing import Bushing
 from .tables.chain import Chain
 from .tables.closures import Constraint, Coupling
-from .tables.elastic import Elastic
-from .tables.elastic_keys import Arrays, Box, ElasticEnd
-from .tables.external.external_names import Names
-from .tables.external.geometry import Shape
-from .tables.external.inputs import Input, Output, Signal
+from .tables.elastic import Arrays, Box, Elastic, ElasticEnd
 from .tables.flexible_keys import Damping, InitialDeformation
-from .tables.hinge import Hinge
-from .tables.hinge_keys import HingeRating, Initial
+from .tables.hinge import Hinge, HingeRating, Initial
+from .tables.inputs import Input, Output, Signal
 from .tables.law import Friction, Law, LawEntry, Limits, SpringLaw
 from .tables.loads import Event, Load, Spring
+from .tables.names import Names
+from .tables.shape import Shape
 from .validators.scalars_and_vectors import split_reference
 
 __all__ = [

@@ -20,11 +20,10 @@ from ..notebook_html import NotebookDisplay
 from ..notebook_html import table as html_table
 from ..public_members import PublicMembers
 from ..risk import Risk, sentences
-from .checks import consistency, couplings, doubtful_input, flexible_bodies, user_types
-from .files.write import to_toml
-from .tables.beam_keys import ROOT
-from .tables.constants import evaluate_constants
-from .tables.scene_tables import SceneTables
+from .checks import closures, consistency, flexible_bodies, input_warnings, user_types
+from .files import to_toml
+from .tables.beam import ROOT
+from .tables.scene_tables import SceneTables, evaluate_constants
 from .validators import constant_expressions
 from .validators.scalars_and_vectors import ValidationProblems
 from .validators.validation_messages import TABLES, build_scene_error, scene_error
@@ -101,7 +100,7 @@ class Scene(PublicMembers, SceneTables, NotebookDisplay):
     @property
     def risks(self) -> tuple[Risk, ...]:
         """Warnings about accepted but doubtful input."""
-        return doubtful_input.risks(self)
+        return input_warnings.risks(self)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -136,7 +135,7 @@ class Scene(PublicMembers, SceneTables, NotebookDisplay):
             with constant_expressions.constants_context(self.constants, self.channels):
                 problems = user_types.apply_definitions(self, known_types)
                 problems = problems or [
-                    *couplings.problems(self),
+                    *closures.coupling_problems(self),
                     *flexible_bodies.spin_problems(self),
                 ]
         if problems:

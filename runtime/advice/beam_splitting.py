@@ -12,8 +12,7 @@ from itertools import pairwise
 from typing import Any
 
 from mstmm.scene import Damping, Hinge, Load, Scene, split_reference
-from mstmm.scene.tables.beam import Beam
-from mstmm.scene.tables.beam_keys import GIVEN, ROOT, TIP, Modes
+from mstmm.scene.tables.beam import GIVEN, ROOT, TIP, Beam, Modes
 from mstmm.scene.tables.flexible_keys import AUTO
 
 from ..chart.model_levels import with_tables

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from mstmm.scene import Scene
-from mstmm.scene.tables.beam import Beam
-from mstmm.scene.tables.beam_keys import DIRECTIONS, Modes
+from mstmm.scene.tables.beam import DIRECTIONS, Beam, Modes
 from mstmm.scene.tables.elastic import Elastic
 
 from ..chart.model_levels import beam_modes, vibration_mode_count, with_mode_counts, with_tables

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from mstmm.scene import Names, Scene
-from mstmm.scene.tables.beam import Beam
-from mstmm.scene.tables.beam_keys import DIRECTIONS, Modes, Shapes
+from mstmm.scene.tables.beam import DIRECTIONS, Beam, Modes, Shapes
 from mstmm.scene.tables.elastic import Elastic
 
 from ..engine.body_references import BodyReferences

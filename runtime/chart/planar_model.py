@@ -17,9 +17,8 @@ from mstmm.array_validation import Array
 from mstmm.ir.hinge_properties import builtin_hinges
 from mstmm.numerics.rotations import perpendicular_vector
 from mstmm.scene import Hinge
-from mstmm.scene.tables.beam import Beam
-from mstmm.scene.tables.beam_keys import DIRECTIONS, Modes
-from mstmm.scene.tables.hinge_keys import Initial
+from mstmm.scene.tables.beam import DIRECTIONS, Beam, Modes
+from mstmm.scene.tables.hinge import Initial
 
 from .model_levels import Variant, beam_modes, with_mode_counts, with_tables
 

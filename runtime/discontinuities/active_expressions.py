@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from mstmm.expression.expression import Expression
 from mstmm.expression.inputs import Inputs
 from mstmm.scene import Scene
-from mstmm.scene.tables.body_hinge_lookup import Hinges
+from mstmm.scene.tables.chain import Hinges
 from mstmm.scene.tables.hinge import Hinge, HingeTable
 from mstmm.scene.tables.loads import Spring
 

@@ -13,7 +13,7 @@ from mstmm.array_validation import Array
 from mstmm.expression.derivative import expression_derivatives
 from mstmm.expression.drive import motion_at
 from mstmm.expression.expression import Expression, Name
-from mstmm.scene.checks.loop_closures import resolve_coordinate
+from mstmm.scene.checks.connectivity import resolve_coordinate
 
 from .engine_calls import EngineCalls, Probe
 

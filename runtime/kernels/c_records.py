@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mstmm.array_validation import Integers
 from mstmm.errors import SceneError
-from mstmm.scene.tables.body_hinge_lookup import Members
+from mstmm.scene.tables.chain import Members
 
 _INTEGER_TYPES = {"int": np.int32, "int64_t": np.int64}
 

@@ -20,7 +20,7 @@ from mstmm.array_validation import Array
 from mstmm.errors import SceneError
 from mstmm.ir.hinge_properties import effort_unit
 from mstmm.numerics.piecewise_polynomial import PiecewisePolynomial
-from mstmm.scene.tables.external.inputs import Input
+from mstmm.scene.tables.inputs import Input
 from mstmm.scene.validators.validation_messages import did_you_mean
 
 from ..discontinuities.active_expressions import active_expressions

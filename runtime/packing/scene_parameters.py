@@ -16,8 +16,8 @@ from mstmm.errors import SceneError
 from mstmm.expression.drive import motion_at
 from mstmm.scene import Scene
 from mstmm.scene.checks.user_types import copy_definitions
-from mstmm.scene.files.write import to_toml
-from mstmm.scene.tables.constants import evaluate_constants
+from mstmm.scene.files import to_toml
+from mstmm.scene.tables.scene_tables import evaluate_constants
 from mstmm.scene.validators.constant_expressions import constants_context
 from mstmm.scene.validators.names_and_text import to_expression
 from mstmm.scene.validators.scalars_and_vectors import ValidationProblems

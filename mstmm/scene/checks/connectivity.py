@@ -1,16 +1,79 @@
-"""Connectivity graph of a scene, with chains as single nodes or with every body separate."""
+"""Connectivity graph of a scene, rows of its loop closures, and messages where it has no tree."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from ...graph.mechanism_graph import GROUND, Edge, MechanismGraph
+from ...expression.expression import Name
+from ...graph.mechanism_graph import GROUND, Edge, MechanismGraph, RowGroup
+from ...graph.tree_errors import (
+    AllHingesCut,
+    ConflictingTreeHinges,
+    Cyclic,
+    TreeProblem,
+    UnconnectedBodies,
+    WrongHingeDirection,
+    tree_problems,
+)
 from ..validators.scalars_and_vectors import split_reference
-from .loop_closures import closure_row_groups, row_count_if_cut
+from ..validators.validation_messages import Problem
 
 if TYPE_CHECKING:
+    from ..tables.hinge import HingeTable
     from ..tables.scene_tables import SceneTables
+
+
+def row_count_if_cut(hinge: HingeTable) -> int:
+    """Number of constraint rows of a hinge if it is cut.
+
+    These are 6 less its coordinates, plus one for each coordinate that is driven or carries rotor
+    inertia.  A user-defined type counts as a pin until its definition is loaded.
+    """
+    speeds = 1 if hinge.facts is None else len(hinge.facts.speeds)
+    drive, inertia = hinge.drive or (), hinge.law.inertia
+    driven_count = sum(any(drive[k : k + 1]) or any(inertia[k : k + 1]) for k in range(speeds))
+    return 6 - speeds + driven_count
+
+
+def closure_row_groups(scene: SceneTables) -> Iterator[RowGroup]:
+    """Row groups of the constraints of a scene, then those of its couplings."""
+    for constraint in scene.constraint:
+        yield _row_group(scene, (constraint.from_, constraint.to), constraint.rows)
+    for coupling in scene.coupling:
+        coupled_hinges = (
+            scene.hinges.by_name[name] for name in dict.fromkeys(n.hinge for n in coupling.names)
+        )
+        yield _row_group(
+            scene, [end for hinge in coupled_hinges for end in (hinge.inboard, hinge.outboard)], 1
+        )
+
+
+def resolve_coordinate(scene: SceneTables, name: Name) -> tuple[int, str, int]:
+    """Resolve a name in a coupling to (hinge number, "q" or "u", entry).
+
+    The name is `arm.q`, `arm.q[1]`, `arm.u`, or a coordinate by its own name, `arm.angle`.  Raises
+    KeyError where the scene has no such hinge, ValueError where the hinge has no such entry.
+    """
+    hinge = scene.hinges.find(name.hinge)
+    if hinge is None:
+        raise KeyError(name.hinge)
+    if name.quantity in ("q", "u"):
+        return hinge, name.quantity, name.index or 0
+    facts = scene.hinges[hinge].facts
+    coordinate_names = (
+        [coordinate_info.name for coordinate_info in facts.coordinates] if facts is not None else []
+    )
+    return hinge, "q", coordinate_names.index(name.quantity)
+
+
+def _row_group(scene: SceneTables, ends: Sequence[str], count: int) -> RowGroup:
+    """Row group between ends of bodies or the ground."""
+    bodies = (scene.bodies.find(split_reference(end)[0]) for end in ends)
+    return RowGroup(tuple(GROUND if body is None else body for body in bodies), count)
+
+
+# --- graph ----------------------------------------------------------------------------------------
 
 
 class ConnectivityGraph:
@@ -87,3 +150,61 @@ class ConnectivityGraph:
         node, member = self.holder(edge)
         bodies = len(self.scene.body)
         return node if node < bodies else self.scene.bodies.starts[node - bodies] + member
+
+
+# --- messages about hinges that form no spanning tree ---------------------------------------------
+
+
+def spanning_tree_problems(joints: ConnectivityGraph) -> Iterator[Problem]:
+    """Locations and messages of all reasons why there is no spanning tree."""
+    for problem in tree_problems(joints.node_mechanism):
+        yield _tree_problem(joints, problem)
+
+
+def _tree_problem(joints: ConnectivityGraph, one: TreeProblem) -> Problem:
+    match one:
+        case WrongHingeDirection(body, hinge):
+            return (
+                ("body", body),
+                f"it has no inboard hinge; swap inboard and outboard of hinge "
+                f'"{joints.edge_name(hinge)}"',
+            )
+        case UnconnectedBodies():
+            return _unconnected_problem(joints, one)
+        case ConflictingTreeHinges(body, (first, second, *_)):
+            return (
+                (*joints.scene_location(second), "cut"),
+                f'"{joints.name(body)}" already has the inboard hinge "{joints.edge_name(first)}" '
+                "with cut = false; leave cut out of one of them",
+            )
+        case AllHingesCut(body, (hinge,)):
+            return (
+                (*joints.scene_location(hinge), "cut"),
+                f'cannot be cut: it is the only inboard hinge of "{joints.name(body)}"; '
+                "leave cut out",
+            )
+        case AllHingesCut(body, hinges) | Cyclic(body, hinges):
+            names = " or ".join(f'"{joints.edge_name(hinge)}"' for hinge in hinges[:4])
+            return (
+                (*joints.scene_location(hinges[0]), "cut"),
+                f'with these cut keys no tree of hinges reaches "{joints.name(body)}"; '
+                f"leave cut out of {names}",
+            )
+    raise AssertionError(one)
+
+
+def _unconnected_problem(joints: ConnectivityGraph, one: UnconnectedBodies) -> Problem:
+    names = [joints.name(node) for node in one.bodies]
+    more_text = f" (with {', '.join(names[1:5])}{', ...' if len(names) > 5 else ''})"
+    more_text = more_text if names[1:] else ""
+    bodies = len(joints.scene.body)
+    if one.bodies[0] >= bodies:
+        return (
+            ("chain", one.bodies[0] - bodies),
+            f'no hinge connects it{more_text} to the ground; set inboard = "ground"',
+        )
+    return (
+        ("body", one.bodies[0]),
+        f'no hinge connects it{more_text} to the ground; add a hinge of type "free" with '
+        f'inboard = "ground" and outboard = "{joints.name(one.base)}"',
+    )

@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING
 from ...expression.expression import Expression
 from ...expression.parser import context_of_name
 from ..tables.closures import CURVE
-from ..validators.inertia import negative_moment_message, triangle_message
+from ..validators.rotations_and_inertia import negative_moment_message, triangle_message
 from ..validators.scalars_and_vectors import GROUND, Location, split_reference
 from ..validators.validation_messages import MAX_PROBLEMS, TABLES, Problem, did_you_mean
-from . import constraints, couplings, flexible_bodies, inputs, topology
+from . import closures, flexible_bodies, inputs, topology
 from .expression_names import Scope, modal_names, name_problem
 
 if TYPE_CHECKING:
     from ..tables.body import BodyTable
-    from ..tables.body_hinge_lookup import Bodies
+    from ..tables.chain import Bodies
     from ..tables.scene_tables import SceneTables
 
 
@@ -36,9 +36,13 @@ def problems(scene: SceneTables) -> list[Problem]:
         _external_name_problems(scene),
     )
     return first_findings or _first_problems(
-        _expression_problems(scene), inputs.drive_problems(scene), constraints.problems(scene),
-        couplings.problems(scene), _tree_problems(scene), flexible_bodies.spin_problems(scene),
-    )  # fmt: skip
+        _expression_problems(scene),
+        inputs.drive_problems(scene),
+        closures.constraint_problems(scene),
+        closures.coupling_problems(scene),
+        _tree_problems(scene),
+        flexible_bodies.spin_problems(scene),
+    )
 
 
 def _tree_problems(scene: SceneTables) -> Iterator[Problem]:

@@ -11,7 +11,7 @@ from ..validators.constant_expressions import current_constants
 from ..validators.validation_messages import did_you_mean
 
 if TYPE_CHECKING:
-    from ..tables.body_hinge_lookup import Bodies, Hinges
+    from ..tables.chain import Bodies, Hinges
     from ..tables.hinge import Hinge
     from ..tables.scene_tables import SceneTables
 

@@ -9,8 +9,8 @@ from ...errors import ExpressionError
 from ...expression.drive import motion_at
 from ...expression.expression import SWITCHES, Expression
 from ...risk import Risk
-from ..tables.constants import name_problem
-from ..tables.external.inputs import Input
+from ..tables.inputs import Input
+from ..tables.scene_tables import name_problem
 from ..validators.scalars_and_vectors import Location, describe_value
 from ..validators.validation_messages import Problem, did_you_mean
 from .user_types import typed_tables

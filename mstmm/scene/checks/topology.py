@@ -16,8 +16,7 @@ from ...graph.closure_plan import ClosurePlan, closure_plan
 from ...graph.mechanism_graph import GROUND
 from ..validators.scalars_and_vectors import split_reference
 from ..validators.validation_messages import Problem, build_scene_error
-from . import tree_messages
-from .connectivity import ConnectivityGraph
+from .connectivity import ConnectivityGraph, spanning_tree_problems
 
 if TYPE_CHECKING:
     from ..tables.hinge import Hinge
@@ -180,7 +179,7 @@ def build_topology(scene: SceneTables) -> Topology:
     topology = _build_if_tree(joints)
     if topology is None:
         tables = {"body": scene.body, "hinge": scene.hinge, "chain": scene.chain}
-        raise build_scene_error(list(tree_messages.problems(joints)), tables, "scene")
+        raise build_scene_error(list(spanning_tree_problems(joints)), tables, "scene")
     return topology
 
 
@@ -196,7 +195,7 @@ def inboard_hinges_by_body(scene: SceneTables) -> dict[str, Hinge]:
 
 def problems(scene: SceneTables) -> Iterator[Problem]:
     """Locations and messages of all reasons why there is no spanning tree."""
-    yield from tree_messages.problems(ConnectivityGraph(scene))
+    yield from spanning_tree_problems(ConnectivityGraph(scene))
 
 
 def _build_if_tree(joints: ConnectivityGraph) -> Topology | None:
@@ -204,7 +203,7 @@ def _build_if_tree(joints: ConnectivityGraph) -> Topology | None:
     scene, plan = joints.scene, None
     inboard_edges = _unique_inboard_edges(joints)
     if inboard_edges is None or scene.constraint or scene.coupling:
-        if next(tree_messages.problems(joints), None) is not None:
+        if next(spanning_tree_problems(joints), None) is not None:
             return None
         plan = closure_plan(joints.body_mechanism())
         chains = range(len(scene.hinge), len(joints.outboard))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from ...expression.expression import Expression
 from ...ir.element_spec import ElementSpec
 from ...ir.hinge_properties import builtin_hinges, effort_unit
-from ..tables.hinge_rules import resolve_defaults_for, unexpected_keys
+from ..tables.hinge import resolve_defaults_for, unexpected_keys
 from ..validators.scalars_and_vectors import Location, ValidationProblems
 from ..validators.validation_messages import Problem, did_you_mean
 from .expression_names import index_problem

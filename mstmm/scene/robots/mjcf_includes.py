@@ -9,7 +9,7 @@ from pathlib import Path
 
 from ...argument_validation import abbreviate
 from ...errors import SceneError
-from ..files.read import read_content
+from ..files import read_content
 from .xml_reader import Element, parse_xml
 
 #: Most nested elements: bodies of a long chain are nested.

@@ -16,14 +16,13 @@ from ..checks.topology import build_topology
 from ..scene import Scene
 from ..validators.scalars_and_vectors import GROUND
 from .robot_model import FIXED, ImportNote, Joint, Link, Mimic, Robot, Visual
-from .urdf_reader import JOINT_TYPES_BY_HINGE
-from .urdf_writer import as_urdf
+from .urdf import JOINT_TYPES_BY_HINGE, as_urdf
 
 if TYPE_CHECKING:
     from ..tables.body import Body
     from ..tables.closures import Coupling
-    from ..tables.external.geometry import Shape
     from ..tables.hinge import Hinge
+    from ..tables.shape import Shape
 
 #: Tables of a scene without counterpart in a robot file.
 _UNSUPPORTED_TABLES = (

@@ -12,16 +12,24 @@ from ...argument_validation import abbreviate
 from ...errors import SceneError
 from ...numerics.pose import IDENTITY_POSE, Pose
 from ...numerics.rotations import IDENTITY, to_quaternion
-from ..files.write import as_toml
+from ..files import as_toml
 from ..scene import Scene
-from ..validators.inertia import triangle_message
+from ..validators.rotations_and_inertia import triangle_message
 from ..validators.scalars_and_vectors import GROUND
 from ..validators.validation_messages import did_you_mean
-from .link_tree import LinkTree
-from .merged_inertia import merge_inertia, remove_rounding_inertia
-from .mesh_paths import MeshFinder
-from .name_mapping import NameRegistry, reference_names
-from .robot_model import FIXED, ZERO_MATRIX, ImportNote, Joint, Link, Mimic, Robot
+from .name_mapping import MeshFinder, NameRegistry, reference_names
+from .robot_model import (
+    FIXED,
+    ZERO_MATRIX,
+    ImportNote,
+    Joint,
+    Link,
+    LinkTree,
+    Mimic,
+    Robot,
+    merge_inertia,
+    remove_rounding_inertia,
+)
 from .unit_conversion import unit_notes
 
 BASES = (FIXED, "free")

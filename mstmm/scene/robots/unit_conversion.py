@@ -12,8 +12,7 @@ from ...errors import SceneError
 from ...ir.hinge_properties import builtin_hinges
 from ...numerics.pose import Pose
 from ...numerics.rotations import Matrix, Vector
-from .link_tree import LinkTree
-from .robot_model import ImportNote, Joint, Link, Mimic, Robot, Visual
+from .robot_model import ImportNote, Joint, Link, LinkTree, Mimic, Robot, Visual
 
 #: Quantity -> unit -> its size in m or kg.
 UNIT_SIZES = {

@@ -10,7 +10,7 @@ from ...numerics.rotations import IDENTITY, Matrix, Vector, from_orientation
 from ..validators import names_and_text as texts
 from ..validators import rotations_and_inertia
 from ..validators import scalars_and_vectors as rules
-from ..validators.inertia import without_rounding
+from ..validators.rotations_and_inertia import without_rounding
 from ..validators.scalars_and_vectors import (
     MAX_ENTRY,
     NAME_PATTERN,

@@ -18,7 +18,7 @@ from ...numerics.rotations import (
     perpendicular_vector,
     unit_rejection,
 )
-from .hinge_keys import HingeKeys
+from .hinge import HingeKeys
 
 
 def hinge_frames(hinge: HingeKeys) -> tuple[Matrix, Matrix]:

@@ -12,7 +12,7 @@ from ...numerics.rotations import Vector
 from ..validators import names_and_text as texts
 from ..validators import scalars_and_vectors as rules
 from ..validators.scalars_and_vectors import GROUND, Table, describe_value, problem, split_reference
-from .body_hinge_lookup import Hinges
+from .chain import Hinges
 from .hinge import Hinge
 from .law import SpringLaw
 

@@ -8,26 +8,150 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field
 
+from ...expression.expression import FUNCTIONS
 from ...numerics.piecewise_polynomial import PiecewisePolynomial, constant
 from ...numerics.rotations import Vector
+from ..validators import constant_expressions
 from ..validators import names_and_text as texts
 from ..validators import scalars_and_vectors as rules
-from ..validators.scalars_and_vectors import Table
+from ..validators.scalars_and_vectors import (
+    NAME_DESCRIPTION,
+    NAME_PATTERN,
+    Location,
+    Rule,
+    Table,
+    ValidationProblems,
+    describe_value,
+    problem,
+    require_finite,
+    to_python,
+)
 from .beam import Beam
-from .body import Body
-from .body_hinge_lookup import Bodies, Hinges
+from .body import Body, End
 from .bushing import Bushing
-from .chain import Chain
+from .chain import Bodies, Chain, Hinges
 from .closures import Constraint, Coupling
-from .constants import constants_rule as named_numbers
 from .elastic import Elastic
-from .external.controller import Controller
-from .external.external_names import Names
-from .external.geometry import Shape
-from .external.inputs import Input, Output, Signal
 from .hinge import Hinge
+from .inputs import Controller, Input, Output, Signal
 from .loads import Event, Load, Spring, stop_events
-from .rigid_equivalent import massless_body
+from .names import Names
+from .shape import Shape
+
+#: Names with a meaning in expressions, or in the shape functions of beams (x, L).
+RESERVED_NAMES = ("t", "q", "u", "x", "L", "pi", "deg", "free", *FUNCTIONS)
+
+
+def name_problem(name: object) -> str:
+    """Message about a name that users cannot define in expressions, or ""."""
+    if not isinstance(name, str) or not NAME_PATTERN.fullmatch(name):
+        return f"expected a name ({NAME_DESCRIPTION}), found {describe_value(name)}"
+    if name in RESERVED_NAMES:
+        return f'"{name}" already has a meaning in expressions; choose another name'
+    return ""
+
+
+def evaluate_constants(value: Any) -> dict[str, float]:
+    """Evaluate a table of constants: numbers, or expressions of constants above them.
+
+    Raises Refused.
+    """
+    expected = "a table of named numbers"
+    if not isinstance(value, dict):
+        raise problem(f"expected {expected}, found {describe_value(value)}")
+    constants_by_name: dict[str, float] = {}
+    problems: list[tuple[Location, str]] = []
+    for name, given_value in value.items():
+        if problem_ := name_problem(name):
+            problems.append(((str(name),), problem_))
+            continue
+        try:
+            with constant_expressions.constants_context(constants_by_name):
+                constants_by_name[name] = require_finite(
+                    to_python(given_value), "a number, or an expression of constants above", name
+                )
+        except ValidationProblems as refused:
+            problems += refused.problems
+    if problems:
+        raise ValidationProblems(*problems)
+    return constants_by_name
+
+
+def constants_rule() -> Rule:
+    """Rule for the table [constants]."""
+    item = {"type": ["number", "string"]}
+    return Rule(
+        "a table of named numbers",
+        evaluate_constants,
+        {"type": "object", "additionalProperties": item},
+    )
+
+
+# --- rigid equivalents of flexible bodies ---------------------------------------------------------
+
+
+def rigid_body_of_beam(beam: Beam) -> Body:
+    """Rigid body of an undeformed beam: mass, mass centre, inertia and ends."""
+    mass = first_moment = second_moment = polar_sum = 0.0
+    rotary_sums = [0.0, 0.0]
+    for beam_section in beam.sections:
+        mass_per_length, section_length = (
+            beam_section.mass_per_length or 0.0,
+            beam_section.to - beam_section.from_,
+        )
+        mass += mass_per_length * section_length
+        first_moment += (
+            mass_per_length * section_length * (beam_section.to + beam_section.from_) / 2
+        )
+        second_moment += (
+            mass_per_length
+            * section_length
+            * (
+                beam_section.to * beam_section.to
+                + beam_section.to * beam_section.from_
+                + beam_section.from_ * beam_section.from_
+            )
+            / 3
+        )
+        polar_moment = (beam_section.polar_inertia_per_length or 0.0) * section_length
+        polar_sum += polar_moment
+        rotary_inertia = beam_section.rotary_inertia
+        rotary_sums[0] += (
+            polar_moment / 2 if rotary_inertia is None else rotary_inertia[0] * section_length
+        )
+        rotary_sums[1] += (
+            polar_moment / 2 if rotary_inertia is None else rotary_inertia[1] * section_length
+        )
+    centre = first_moment / mass
+    transverse_moment = second_moment - first_moment * centre
+    return Body.model_construct(
+        name=beam.name,
+        type="rigid",
+        mass=mass,
+        center_of_mass=(centre, 0.0, 0.0),
+        inertia=(
+            polar_sum,
+            transverse_moment + rotary_sums[0],
+            transverse_moment + rotary_sums[1],
+            0.0,
+            0.0,
+            0.0,
+        ),
+        ends=beam.ends,
+    )
+
+
+def massless_body(flexible: Beam | Elastic) -> Body:
+    """Massless body with the ends of a flexible body, sufficient for names and the tree."""
+    ends = {
+        name: End.model_construct(position=end.position or (0.0, 0.0, 0.0),
+                                  orientation=end.orientation)
+        for name, end in flexible.ends.items()
+    }  # fmt: skip
+    return Body.model_construct(name=flexible.name, type="rigid", ends=ends)
+
+
+# --- scene ----------------------------------------------------------------------------------------
 
 
 def _check_version(value: Any) -> int:
@@ -42,7 +166,7 @@ class SceneTables(Table):
     schema_version: Annotated[int, rules.Rule("1", _check_version, {"const": 1})] = 1
     gravity: Annotated[Vector, rules.vector_rule("m/s^2, such as [0, -9.81, 0]")]
     allow_unphysical_inertia: Annotated[bool, texts.flag_rule()] = False
-    constants: Annotated[dict[str, float], named_numbers()] = Field(default_factory=dict)
+    constants: Annotated[dict[str, float], constants_rule()] = Field(default_factory=dict)
     input: tuple[Input, ...] = ()
     signal: tuple[Signal, ...] = ()
     output: tuple[Output, ...] = ()

@@ -9,6 +9,7 @@ from typing import Any
 from ...errors import ExpressionError
 from ...expression.expression import Expression, number
 from . import constant_expressions
+from .constant_expressions import unit_remedy
 from .scalars_and_vectors import (
     BODY_PATTERN,
     GROUND,
@@ -23,7 +24,6 @@ from .scalars_and_vectors import (
     require_list,
     to_python,
 )
-from .unit_suffixes import unit_remedy
 
 
 def name_rule(expected: str, missing: str = "") -> Rule:

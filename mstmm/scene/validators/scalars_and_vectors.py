@@ -20,7 +20,7 @@ from pydantic_core import CoreSchema, core_schema
 from ...errors import ExpressionError
 from ...numerics.rotations import norm
 from . import constant_expressions
-from .unit_suffixes import unit_hint, unit_remedy
+from .constant_expressions import unit_hint, unit_remedy
 
 NAME_PATTERN = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
 #: A body of the scene: its name, or a chain member, "rope[3]" or "rope[last]".

@@ -10,7 +10,7 @@ import numpy as np
 
 from mstmm.array_validation import Array
 from mstmm.errors import SceneError
-from mstmm.scene.tables.beam_keys import Modes
+from mstmm.scene.tables.beam import Modes
 from mstmm.scene.tables.loads import Load
 
 from ..cache_key import CacheKey

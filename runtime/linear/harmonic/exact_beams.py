@@ -18,7 +18,7 @@ import numpy as np
 from mstmm.array_validation import Array, Integers
 from mstmm.errors import SceneError
 from mstmm.scene import split_reference
-from mstmm.scene.tables.beam_keys import DIRECTIONS
+from mstmm.scene.tables.beam import DIRECTIONS
 from mstmm.scene.validators.validation_messages import did_you_mean
 
 from ...engine.harmonic_response import Complex, DynamicStiffnessBodies

@@ -21,7 +21,7 @@ from mstmm.expression.expression import Expression, parse
 from mstmm.numerics.rotations import Matrix, to_quaternion
 from mstmm.scene import Body, Bushing, Constraint, End, Hinge, Load, Scene, Spring, split_reference
 from mstmm.scene.checks.topology import build_topology, inboard_hinges_by_body
-from mstmm.scene.tables.rigid_equivalent import rigid_body_of_beam
+from mstmm.scene.tables.scene_tables import rigid_body_of_beam
 
 from ...flexible.modal_body import ModalBody
 from ...flexible.modal_port import ModalPort

@@ -22,7 +22,7 @@ from mstmm.ir.differentiation import derivative
 from mstmm.ir.graph import Graph, Node
 from mstmm.ir.inline import Inliner
 from mstmm.scene import Coupling, Scene, split_reference
-from mstmm.scene.checks.loop_closures import resolve_coordinate
+from mstmm.scene.checks.connectivity import resolve_coordinate
 
 from ..coordinate_layout import HingeSlots
 from ..expression_tapes import state_ports

@@ -18,7 +18,7 @@ from mstmm.ir.hinge_properties import HingeProperties
 from mstmm.ir.param import Param
 from mstmm.ir.tape import compile_tape
 from mstmm.scene import Constraint, Hinge
-from mstmm.scene.tables.hinge_keys import Initial
+from mstmm.scene.tables.hinge import Initial
 
 from ...kernels.prebuilt_kernels import Element
 

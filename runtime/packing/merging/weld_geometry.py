@@ -5,8 +5,7 @@ from __future__ import annotations
 from mstmm.numerics.pose import IDENTITY_POSE, ZERO, Pose
 from mstmm.numerics.rotations import IDENTITY, Quaternion, Vector, to_quaternion
 from mstmm.scene import Body, End, Hinge
-from mstmm.scene.robots.merged_inertia import merge_inertia
-from mstmm.scene.robots.robot_model import Link
+from mstmm.scene.robots.robot_model import Link, merge_inertia
 
 
 def to_orientation(pose: Pose) -> Quaternion | Vector:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mstmm.array_validation import Array
-from mstmm.scene.checks.welded_beams import beam_lines
+from mstmm.scene.checks.flexible_bodies import beam_lines
 
 from ...flexible.memory_chunks import chunk_slices
 from ...flexible.modal_scales import radius_of_gyration

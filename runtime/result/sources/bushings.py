@@ -11,7 +11,7 @@ import numpy as np
 from mstmm.array_validation import Array
 from mstmm.ir import KernelIR
 from mstmm.ir.json_format import kernel_from_json
-from mstmm.scene.validators.symmetric_matrices import upper_triangle
+from mstmm.scene.tables.bushing import upper_triangle
 
 from ...engine.engine_calls import Probe
 from ...engine.observation_columns import POINT_COLUMNS, XYZ, QuantityKind

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.mstmm.scene.robots.test_urdf_reader import ARM
+from tests.mstmm.scene.robots.test_urdf import ARM
 from tests.support.commands import Command
 
 

@@ -16,7 +16,7 @@ import mstmm
 from mstmm.errors import SceneError
 from mstmm.scene.robots.robot_model import Robot
 from mstmm.scene.robots.scene_from_robot import ImportedRobot, ImportOptions, scene_from_robot
-from mstmm.scene.robots.urdf_reader import read_urdf
+from mstmm.scene.robots.urdf import read_urdf
 
 #: Packages with robots in URDF.
 PACKAGES = ("example-robot-data", "pybullet")

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import mstmm
-from tests.mstmm.scene.robots.test_urdf_reader import ARM, joint, write_robot_file
+from tests.mstmm.scene.robots.test_urdf import ARM, joint, write_robot_file
 
 
 @pytest.mark.parametrize("choices", [{}, {"merge": False}, {"base": "free"}])

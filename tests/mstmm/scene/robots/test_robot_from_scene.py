@@ -11,7 +11,7 @@ import pytest
 import mstmm
 from mstmm.numerics.rotations import from_rpy, to_rpy
 from mstmm.scene import HingeRating
-from tests.mstmm.scene.robots.test_urdf_reader import ARM, write_robot_file
+from tests.mstmm.scene.robots.test_urdf import ARM, write_robot_file
 
 HINGES: tuple[dict[str, Any], ...] = (
     {"name": "mast", "type": "pin", "inboard": "ground", "position": [0.1, 0.2, 0.3],

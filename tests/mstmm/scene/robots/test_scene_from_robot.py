@@ -11,7 +11,7 @@ import pytest
 import mstmm
 from mstmm.scene.robots.robot_model import Joint, Link, Mimic, Robot
 from mstmm.scene.robots.scene_from_robot import ImportOptions, scene_from_robot
-from tests.mstmm.scene.robots.test_urdf_reader import ARM, write_robot_file
+from tests.mstmm.scene.robots.test_urdf import ARM, write_robot_file
 
 _UNIT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 

@@ -9,7 +9,7 @@ import pytest
 
 import mstmm
 from mstmm.array_validation import Array
-from tests.mstmm.scene.robots.test_urdf_reader import write_robot_file
+from tests.mstmm.scene.robots.test_urdf import write_robot_file
 
 #: A cart on a rail along x, and on it a pole about y that hangs down at 0.
 CART = """<robot name="cart"><link name="base"/>

@@ -11,7 +11,7 @@ import mstmm
 from mstmm.scene.robots.robot_model import Joint, Link, Mimic, Robot
 from mstmm.scene.robots.scene_from_robot import ImportedRobot, ImportOptions, scene_from_robot
 from tests.mstmm.scene.robots.test_scene_from_robot import chain, pin
-from tests.mstmm.scene.robots.test_urdf_reader import ARM, joint, robot, write_robot_file
+from tests.mstmm.scene.robots.test_urdf import ARM, joint, robot, write_robot_file
 
 IN_M = """<robot><link name="base"/>
   <joint name="rail" type="prismatic"><parent link="base"/><child link="cart"/>

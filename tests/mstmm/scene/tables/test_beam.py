@@ -14,7 +14,7 @@ from mstmm.errors import SceneError
 from mstmm.expression.expression import parse
 from mstmm.scene import Scene, load_scene
 from mstmm.scene.checks import topology
-from mstmm.scene.tables.rigid_equivalent import rigid_body_of_beam
+from mstmm.scene.tables.scene_tables import rigid_body_of_beam
 from mstmm.scene.tables.shape_functions import ShapeFunction, shape_at
 from tests.support.scenes.minimal import Data, blade_scene, hinge
 

@@ -10,7 +10,7 @@ import pytest
 
 from mstmm.errors import SceneError
 from mstmm.scene import Scene
-from mstmm.scene.validators.symmetric_matrices import full_matrix
+from mstmm.scene.tables.bushing import full_matrix
 from tests.support.scenes.minimal import Data, arm
 
 SIX = [1.0, 2, 3, 4, 5, 6]

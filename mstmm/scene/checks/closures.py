@@ -1,4 +1,4 @@
-"""Checks of couplings: defined names, differentiable expressions, free coordinates."""
+"""Checks of constraints and couplings: smooth curves and rows, free coordinates, no duplicates."""
 
 from __future__ import annotations
 
@@ -6,24 +6,98 @@ import math
 from collections.abc import Collection, Iterator
 from typing import TYPE_CHECKING
 
+from ...errors import ExpressionError
 from ...expression.derivative import dependency_parts, expression_derivatives
-from ...expression.drive import motion_at
+from ...expression.drive import motion, motion_at, node_value
 from ...expression.expression import Expression, Name
 from ...expression.parser import context_of_name
-from ..tables.hinge_rules import drive_problems
+from ...ir.graph import Graph
+from ..tables.closures import DISTANCE
+from ..tables.hinge import drive_problems
 from ..validators.scalars_and_vectors import Location, describe_value
 from ..validators.validation_messages import Problem
+from .connectivity import resolve_coordinate
 from .expression_names import index_problem, modal_names
 from .inputs import switching_term
-from .loop_closures import resolve_coordinate
 
 if TYPE_CHECKING:
-    from ..tables.closures import Coupling
+    from ..tables.closures import Constraint, Coupling
     from ..tables.hinge import Hinge
     from ..tables.scene_tables import SceneTables
 
 
-def problems(scene: SceneTables) -> Iterator[Problem]:
+def constraint_problems(scene: SceneTables) -> Iterator[Problem]:
+    """Problems of constraints: curves that cannot be followed, and duplicates."""
+    for i, constraint in enumerate(scene.constraint):
+        if constraint.curve is not None:
+            yield from _curve_problems(
+                constraint.curve, constraint.start or 0.0, ("constraint", i, "curve")
+            )
+    yield from _duplicates(scene)
+
+
+def _curve_problems(
+    curve: tuple[Expression, ...], start: float, place: Location
+) -> Iterator[tuple[Location, str]]:
+    """Problems of a curve: other names than s, kinks, or no direction at its start."""
+    derivatives = []
+    for k, entry in enumerate(curve):
+        other_names = [name.text for name in entry.names if name.text != "s"]
+        switch_text = switching_term(entry, {"s"})
+        if other_names:
+            yield (
+                (*place, k),
+                f"expected a function of s only, found {other_names[0]!r}; leave it out",
+            )
+        elif switch_text:
+            yield (
+                (*place, k),
+                f"no derivative where {switch_text!r} switches; use a smooth expression",
+            )
+        else:
+            try:
+                start_values = _value_and_derivatives(entry, start)
+            except ExpressionError as error:
+                yield (*place, k), str(error)
+                continue
+            derivatives.append(start_values[1])
+            if not all(map(math.isfinite, start_values)):
+                yield (
+                    (*place, k),
+                    f"{describe_value(entry.text)} or one of its first two derivatives is not "
+                    f"finite at s = {start:g}; set start to another value",
+                )
+    if len(derivatives) == len(curve) and not any(derivatives):
+        yield place, f"all derivatives are 0 at s = {start:g}; set start to another value"
+
+
+def _value_and_derivatives(entry: Expression, start: float) -> list[float]:
+    """Value of an expression of s and its first two derivatives at the start."""
+    s = Graph().element("s")
+    return [node_value(node, lambda _: start) for node in motion(entry, s, lambda _: s)]
+
+
+def _duplicates(scene: SceneTables) -> Iterator[Problem]:
+    """Problems of constraints that repeat an earlier one."""
+    first_indices: dict[tuple[object, ...], int] = {}
+    for i, constraint in enumerate(scene.constraint):
+        first_index = first_indices.setdefault(_duplicate_key(constraint), i)
+        if first_index != i:
+            yield ("constraint", i), f"repeats constraint number {first_index + 1}; leave one out"
+
+
+def _duplicate_key(one: Constraint) -> tuple[object, ...]:
+    """Key that is equal for constraints which repeat or contradict each other."""
+    ends = (one.from_, one.to)
+    end_key = tuple(sorted(ends)) if one.type == DISTANCE else ends
+    curve = tuple(entry.text for entry in one.curve or ())
+    return one.type, end_key, one.position, one.unit_normal, curve
+
+
+# --- couplings ------------------------------------------------------------------------------------
+
+
+def coupling_problems(scene: SceneTables) -> Iterator[Problem]:
     """Problems of couplings, as far as the types of their hinges are defined."""
     first_indices: dict[str, int] = {}
     for i, coupling in enumerate(scene.coupling):

@@ -9,7 +9,7 @@ import pytest
 from mstmm.errors import SceneError
 from mstmm.scene import Scene, load_scene
 from mstmm.scene.checks import topology
-from mstmm.scene.checks.loop_closures import row_count_if_cut
+from mstmm.scene.checks.connectivity import row_count_if_cut
 from mstmm.scene.checks.topology import Topology
 from tests.support.scenes.minimal import Data, arm, beam, body, hinge
 

@@ -8,7 +8,7 @@ import pytest
 
 from mstmm.errors import SceneError
 from mstmm.scene import Scene
-from mstmm.scene.checks.loop_closures import resolve_coordinate
+from mstmm.scene.checks.connectivity import resolve_coordinate
 from tests.support.scenes.minimal import arm, beam, body, hinge
 
 

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from ...validators.scalars_and_vectors import (
+from ..validators.scalars_and_vectors import (
     Location,
     Rule,
     Table,

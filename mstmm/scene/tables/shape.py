@@ -8,11 +8,11 @@ from typing import Annotated, Any
 
 from pydantic import model_validator
 
-from ....numerics.rotations import Matrix, Vector, from_orientation
-from ...validators import names_and_text as texts
-from ...validators import rotations_and_inertia
-from ...validators import scalars_and_vectors as rules
-from ...validators.scalars_and_vectors import (
+from ...numerics.rotations import Matrix, Vector, from_orientation
+from ..validators import names_and_text as texts
+from ..validators import rotations_and_inertia
+from ..validators import scalars_and_vectors as rules
+from ..validators.scalars_and_vectors import (
     GROUND,
     Location,
     Orientation,
@@ -23,7 +23,7 @@ from ...validators.scalars_and_vectors import (
     problem,
     split_reference,
 )
-from ..elastic_keys import path_inside_rule
+from .elastic import path_inside_rule
 
 #: Keys of each type.
 _KEYS_BY_TYPE = {

@@ -1,1 +1,0 @@
-"""Scene files: reading TOML and JSON, writing TOML."""

@@ -1,1 +1,0 @@
-"""Tables for the exchange with other programs: inputs, outputs, controllers, names, geometry."""
