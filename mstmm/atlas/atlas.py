@@ -12,8 +12,7 @@ from ..argument_validation import abbreviate
 from ..errors import EnvironmentFailure, NumericalFailure, SceneError
 from ..runtime.platform_support.safe_files import write_text
 from . import cases as case_registry
-from .case_definition import CaseDefinition
-from .case_result import CaseResult
+from .case_definition import CaseDefinition, CaseResult
 from .frontier import MeasuredMethod, find_end, find_frontier
 
 #: Values of the coarse grid, and relative width of the last bracket.

@@ -1,4 +1,4 @@
-"""Error measures that several cases use."""
+"""Error measures and steps that several cases use."""
 
 from __future__ import annotations
 
@@ -141,3 +141,11 @@ def _rotating_body() -> tuple[Model, Array]:
     body = spinning_top("ball", SPIN)
     run = simulate_to_end(body, ROTATION_TIME, rtol=1e-13, atol=1e-15, output_times=[ROTATION_TIME])
     return body, run.q[-1]
+
+
+def rk4_step(slope: Callable[[Array], Array], y: Array, step: float) -> Array:
+    """State y after one step (s) of y' = slope(y)."""
+    first = slope(y)
+    second = slope(y + step / 2 * first)
+    third = slope(y + step / 2 * second)
+    return y + step / 6 * (first + 2 * second + 2 * third + slope(y + step * third))

@@ -8,9 +8,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from ..errors import NumericalFailure
-from .parameter_scale import Scale
-
-Points = tuple[tuple[float, float], ...]
+from .case_definition import Points, Scale
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from .case_result import CaseResult
+from .case_definition import CaseResult
 
 INTRODUCTION = """\
 # Failure atlas: limits of numerical methods

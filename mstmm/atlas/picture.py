@@ -12,8 +12,7 @@ from ..runtime.platform_support.safe_files import replace_atomically
 from .page import format_number, tested_range
 
 if TYPE_CHECKING:
-    from .case_result import CaseResult
-    from .frontier import Points
+    from .case_definition import CaseResult, Points
 
 #: Colours that differ in grey and for colour-blind readers (Okabe and Ito, 2008).
 _FAILURE_COLOUR, _REMEDY_COLOUR, _FAILURE_SIDE_COLOUR = "#D55E00", "#0072B2", "#fbe6da"

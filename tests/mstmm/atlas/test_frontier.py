@@ -7,9 +7,15 @@ import math
 import pytest
 
 from mstmm.atlas.atlas import measure_case
-from mstmm.atlas.case_definition import CaseDefinition, MethodDefinition
+from mstmm.atlas.case_definition import (
+    COUNT_SCALE,
+    LINEAR_SCALE,
+    LOG_SCALE,
+    CaseDefinition,
+    MethodDefinition,
+    Scale,
+)
 from mstmm.atlas.frontier import MeasuredMethod, find_end, find_frontier
-from mstmm.atlas.parameter_scale import COUNT_SCALE, LINEAR_SCALE, LOG_SCALE, Scale
 from mstmm.errors import NumericalFailure
 
 ENDS = {

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from mstmm.atlas.case_result import CaseResult
+from mstmm.atlas.case_definition import CaseResult
 from mstmm.atlas.page import markdown_page
 from mstmm.plain_data import from_plain
 from tests.mstmm.atlas.cases.test_cases import EXPECTED

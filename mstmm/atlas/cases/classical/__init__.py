@@ -1,1 +1,0 @@
-"""Cases of steps in absolute coordinates, by the classical matrices."""

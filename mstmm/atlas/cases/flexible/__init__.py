@@ -1,1 +1,0 @@
-"""Cases of models of flexible bodies."""

@@ -1,1 +1,0 @@
-"""Cases of steps in time."""
