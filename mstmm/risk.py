@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from numbers import Real
 from typing import Any
 
-from .notebook_html import NotebookDisplay, bullets, text
+from .display import NotebookDisplay, bullets, text
 from .plain_data import from_plain, stored_as, to_plain
 
 #: Reactions of a run to its risks.

@@ -20,9 +20,8 @@ from mstmm.abi import element_library as abi
 from mstmm.abi import fused_library as fused_abi
 from mstmm.abi.failure_codes import FailureCode
 from mstmm.ir import OPERATIONS, Guard, KernelIR, Port, Solve
-from mstmm.ir.element_spec import ElementSpec, Param
+from mstmm.ir.element_spec import ElementSpec, Param, element_to_json
 from mstmm.ir.hinge_properties import HingeProperties, hinge_properties_to_data
-from mstmm.ir.json_format import element_to_json
 from mstmm.ir.statements import NEGATIVE_DETERMINANT
 from mstmm.ir.tape import GUARD_OPCODE, INSTRUCTION_WIDTH, OPCODES, OUTPUT_WIDTH
 

@@ -13,8 +13,8 @@ from typing import ClassVar
 
 import sympy as sp
 
+from mstmm.display import NotebookDisplay
 from mstmm.ir.element_spec import Param
-from mstmm.notebook_html import NotebookDisplay
 
 from .derivation import tilde
 

@@ -9,7 +9,7 @@ import sympy as sp
 from sympy.matrices.expressions.matexpr import MatrixElement
 
 from mstmm.ir.element_spec import ElementSpec
-from mstmm.ir.param import Param
+from mstmm.ir.hinge_properties import Param
 
 from ..definition.derivation import Derivation
 from ..definition.element import describe_array

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mstmm.safe_text import abbreviate_names
+from mstmm.display import abbreviate_names
 
 from .options import Json, new_file, parse_positive
 

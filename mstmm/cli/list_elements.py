@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from mstmm.safe_text import escape_control_characters
+from mstmm.display import escape_control_characters
 
 from .options import Json, quote
 

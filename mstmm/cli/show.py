@@ -162,7 +162,7 @@ def _element_views(element: str, at: str) -> list[ElementView]:
             f"{full_name} has no C: runs interpret its intermediate representation; "
             f"to show that: mstmm show {full_name} --at ir"
         )
-    from mstmm.ir.json_format import element_from_json
+    from mstmm.ir.element_spec import element_from_json
 
     return [
         _view_from_spec(element_from_json(kernels), source or "")

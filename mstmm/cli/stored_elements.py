@@ -75,7 +75,7 @@ def generated_text(full_name: str, ending: str) -> str | None:
 @cache
 def generated_specs() -> dict[tuple[str, str], ElementSpec]:
     """All generated elements with their kernels, by (kind, name)."""
-    from mstmm.ir.json_format import element_from_json
+    from mstmm.ir.element_spec import element_from_json
 
     texts = {(e.kind, e.name): generated_text(f"{e.kind}_{e.name}", ".json") for e in _catalogue()}
     return {key: element_from_json(data) for key, data in texts.items() if data is not None}

@@ -12,7 +12,7 @@ import textwrap
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from mstmm.safe_text import escape_control_characters
+from mstmm.display import escape_control_characters
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -12,10 +12,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
 
-from .mechanism_graph import GROUND, MechanismGraph, RowGroup
+from .mechanism_graph import GROUND, MechanismGraph, Paths, RowGroup, Tree, pending_cost
 from .spanning_tree import spanning_tree
-from .tree_growth import Tree
-from .tree_paths import Paths, pending_cost
 
 #: For each group the groups it is coupled with.
 Adjacency = list[set[int]]

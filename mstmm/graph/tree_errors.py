@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from .mechanism_graph import GROUND, MechanismGraph
-from .tree_growth import grow_tree
+from .spanning_tree import grow_tree
 
 
 @dataclass(frozen=True, slots=True)

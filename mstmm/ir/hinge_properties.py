@@ -16,8 +16,20 @@ from typing import Any
 
 from .interpreter import GuardFailure, evaluate_floats
 from .kernel import KernelIR, kernel_from_data, to_json
-from .param import Param
 from .statements import Assign, Constant, Element, Operand, Store, Temporary
+
+
+@dataclass(frozen=True)
+class Param:
+    """Named number of an element: SI unit, default and inclusive bounds (None: no bound)."""
+
+    name: str
+    unit: str = ""
+    description: str = ""
+    default: float | None = None
+    minimum: float | None = None
+    maximum: float | None = None
+
 
 Vector = tuple[float, float, float]
 

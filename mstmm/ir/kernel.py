@@ -11,6 +11,7 @@ from typing import Any
 from .statements import (
     LOOP_INDEX,
     Assign,
+    Check,
     Constant,
     Element,
     Guard,
@@ -23,7 +24,6 @@ from .statements import (
     Sum,
     Temporary,
 )
-from .validation import Check
 
 
 @dataclass(frozen=True)

@@ -1,10 +1,12 @@
-"""Parts of a KernelIR: arrays (ports), operands and statements."""
+"""Parts of a KernelIR: arrays (ports), operands and statements, and their validation."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 from fractions import Fraction
+
+from .operations import OPERATIONS
 
 #: Loop variable of an indexed sum or store, used as an index.
 LOOP_INDEX = "k"
@@ -156,3 +158,150 @@ class Solve:
 
 
 Statement = Assign | Sum | Store | Guard | Solve
+
+
+# --- validation: rejects what no backend could run ------------------------------------------------
+
+
+class Check:
+    """Validation pass over the statements of a kernel, with the values defined so far."""
+
+    def __init__(
+        self,
+        name: str,
+        inputs: tuple[Port, ...],
+        outputs: tuple[Port, ...],
+        size_symbol: str | None,
+    ) -> None:
+        self.name, self.ports, self.size_symbol = name, (*inputs, *outputs), size_symbol
+        self.readable = {port.name: port for port in inputs}
+        self.writable = {port.name: port for port in outputs}
+        self.stored: dict[str, set[tuple[int | str, ...]]] = {}
+        self.defined: set[int] = set()
+        self.ever_defined: set[int] = set()
+        self.constants: set[str] = set()
+
+    def fail(self, text: str) -> None:
+        raise ValueError(f"{self.name}: {text}")
+
+    def run(self, statements: tuple[Statement, ...]) -> None:
+        if len({port.name for port in self.ports}) != len(self.ports):
+            self.fail("two ports have the same name")
+        for port in self.ports:
+            sizes = {extent for extent in port.shape if isinstance(extent, str)}
+            if sizes - {self.size_symbol}:
+                self.fail(f"{port.name} has the shape {port.shape}")
+        for statement in statements:
+            self.statement(statement)
+
+    def statement(self, statement: Statement) -> None:
+        if isinstance(statement, (Assign, Sum)):
+            self.inner(statement, ())
+        elif isinstance(statement, Store):
+            self.store(statement)
+        else:
+            if statement.code == 0:
+                self.fail(f"code 0 means success, not {statement.message!r}")
+            if isinstance(statement, Guard):
+                self.use(statement.condition, ())
+            else:
+                self.solve(statement)
+
+    def inner(self, statement: Inner, loops: tuple[str, ...]) -> None:
+        if isinstance(statement, Assign):
+            self.assign(statement, loops)
+            return
+        if statement.over not in LOOPS or statement.over in loops:
+            self.fail(f"a sum over {statement.over!r} inside loops over {list(loops)}")
+        self.body(statement.body, statement.value, (*loops, statement.over))
+        self.define(statement.number)
+
+    def store(self, store: Store) -> None:
+        letters = [entry for entry in store.index if isinstance(entry, str)]
+        if len(set(letters)) != len(letters):
+            self.fail(f"{store.port}{list(store.index)} stores only a diagonal")
+        self.body(store.body, store.value, store.loops)
+        self.index(store.port, store.index, self.writable, store.loops)
+        if self.size_symbol is None:
+            return
+        if store.port in self.readable:
+            self.fail(f"{store.port} is stored again although it is complete")
+        indices = self.stored.setdefault(store.port, set())
+        indices.add(tuple("" if isinstance(entry, str) else entry for entry in store.index))
+        port = self.writable[store.port]
+        extents = [extent for extent in port.shape if isinstance(extent, int)]
+        if len(indices) == math.prod(extents) and not port.accumulate:
+            self.readable[port.name] = port
+
+    def body(self, body: tuple[Inner, ...], value: Operand, loops: tuple[str, ...]) -> None:
+        if loops and self.size_symbol is None:
+            self.fail("a loop without a size symbol")
+        for statement in body:
+            self.inner(statement, loops)
+        self.use(value, loops)
+        self.defined.difference_update(statement.number for statement in body)
+
+    def assign(self, assign: Assign, loops: tuple[str, ...]) -> None:
+        row = OPERATIONS.get(assign.op)
+        if row is None or row.arity != len(assign.args):
+            self.fail(f"{assign.op} with {len(assign.args)} operands")
+        for operand in assign.args:
+            self.use(operand, loops)
+        self.define(assign.number)
+
+    def define(self, number: int) -> None:
+        if number in self.ever_defined:
+            self.fail(f"t{number} is defined twice")
+        self.ever_defined.add(number)
+        self.defined.add(number)
+
+    def use(self, operand: Operand, loops: tuple[str, ...]) -> None:
+        if isinstance(operand, Temporary):
+            if operand.number not in self.defined:
+                self.fail(f"t{operand.number} is used before it is defined")
+        elif isinstance(operand, Element):
+            self.index(operand.port, operand.index, self.readable, loops)
+        elif operand.text not in self.constants:
+            try:
+                _ = operand.number
+            except ValueError as error:
+                self.fail(str(error))
+            self.constants.add(operand.text)
+
+    def index(
+        self,
+        name: str,
+        index: tuple[int | str, ...],
+        ports: dict[str, Port],
+        loops: tuple[str, ...],
+    ) -> None:
+        if name not in ports:
+            self.fail(f"no port named {name!r}")
+        shape = ports[name].shape
+        if len(index) != len(shape):
+            self.fail(f"{name}{list(index)} does not fit {shape}")
+        for entry, extent in zip(index, shape, strict=True):
+            if isinstance(entry, str) and entry not in loops:
+                self.fail(f"{name}{list(index)} outside a loop")
+            # Loop indices belong to axes of the run-time size, and only to these.
+            if isinstance(entry, str) != isinstance(extent, str):
+                self.fail(f"{name}{list(index)} does not fit {shape}")
+            if isinstance(entry, int) and isinstance(extent, int) and not 0 <= entry < extent:
+                self.fail(f"{name}{list(index)} is out of range")
+
+    def solve(self, solve: Solve) -> None:
+        size = self.size_symbol
+        for name, ports in (
+            (solve.matrix, self.readable), (solve.right, self.readable), (solve.port, self.writable)
+        ):  # fmt: skip
+            if name not in ports:
+                self.fail(f"no port named {name!r}")
+        right, output = self.readable[solve.right], self.writable[solve.port]
+        fits = size is not None and self.readable[solve.matrix].shape == (size, size)
+        fits = fits and right.shape[:1] == (size,) and len(right.shape) <= 2
+        if not fits or output.shape != right.shape or output.accumulate:
+            self.fail(f"solve: {solve.port}, {solve.matrix}, {solve.right} do not fit")
+        if solve.port in self.readable:
+            self.fail(f"{solve.port} is solved for twice")
+        # Later statements may read an output that has been solved for.
+        self.readable[solve.port] = output

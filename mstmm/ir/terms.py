@@ -78,6 +78,18 @@ class Node:
         return self.graph.neg(self)
 
 
+def dependencies(*roots: Node) -> list[Node]:
+    """Nodes that `roots` depend on, themselves included, each after its operands."""
+    nodes: dict[int, Node] = {}
+    stack = [*roots]
+    while stack:
+        node = stack.pop()
+        if node.number not in nodes:
+            nodes[node.number] = node
+            stack.extend(node.args)
+    return [nodes[number] for number in sorted(nodes)]
+
+
 class Terms:
     """Hash-consed terms: equal terms are the same node, and constants are folded at once."""
 

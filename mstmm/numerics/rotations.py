@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from .dual import chain_rule, fsum, has_dual_or_formula, has_formula, hypot, to_real, value_of
 from .symbolic_number import cos_sin_with_values, formula, unit_vector_with_values
@@ -223,3 +224,33 @@ def to_quaternion(matrix: Matrix) -> Quaternion:
         q[1 + k] = rotation_matrix[k][i] + rotation_matrix[i][k]
     w, x, y, z = unit_vector(q)
     return (w, x, y, z) if w >= 0 else (-w, -x, -y, -z)
+
+
+# --- poses: position and orientation of one frame in another --------------------------------------
+
+
+ZERO: Vector = (0.0, 0.0, 0.0)
+
+
+class Pose(NamedTuple):
+    """Pose of a frame in another one: origin (m) and rotation matrix."""
+
+    position: Vector = ZERO
+    rotation: Matrix = IDENTITY
+
+    def compose(self, inner: Pose) -> Pose:
+        """Compose two poses: `inner` is given in this frame; the result in this frame's parent."""
+        x, y, z = rotate(self.rotation, inner.position)
+        a, b, c = self.position
+        return Pose((a + x, b + y, c + z), product(self.rotation, inner.rotation))
+
+    @property
+    def inverse(self) -> Pose:
+        """Pose of the parent frame in this frame."""
+        inverse_rotation = transpose(self.rotation)
+        x, y, z = rotate(inverse_rotation, self.position)
+        return Pose((-x, -y, -z), inverse_rotation)
+
+
+#: Identity pose.
+IDENTITY_POSE = Pose()

@@ -50,7 +50,7 @@ def crosscheck(kind: str, name: str, points: int = 2) -> CrossCheckReport:
     """
     from ..derive.catalogue.kernels import maker
     from ..derive.catalogue.registry import builtin_elements, kind_of
-    from ..ir.json_format import element_from_json
+    from ..ir.element_spec import element_from_json
     from ..runtime.kernels import kernel_store, prebuilt_kernels
 
     make_kernels, compiled = maker(kind, name), prebuilt_kernels.elements().get((kind, name))

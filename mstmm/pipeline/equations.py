@@ -27,8 +27,8 @@ from ..derive.show.formula_width import TextWidth
 from ..derive.show.formulas import equation_lines
 from ..derive.show.show_page import render_page
 from ..derive.show.subjects import element_view, view_of_element
+from ..display import NotebookDisplay
 from ..errors import ElementError, SceneError
-from ..notebook_html import NotebookDisplay
 from ..scene import Scene
 from ..scene.checks.user_types import used_types
 from ..scene.load import is_scene_file

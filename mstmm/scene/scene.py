@@ -14,11 +14,10 @@ from typing import Any, ClassVar
 from pydantic import ConfigDict, ValidationError, model_validator
 
 from ..argument_validation import abbreviate
+from ..display import NotebookDisplay, PublicMembers
+from ..display import table as html_table
 from ..errors import SceneError
 from ..ir.element_spec import ElementSpec
-from ..notebook_html import NotebookDisplay
-from ..notebook_html import table as html_table
-from ..public_members import PublicMembers
 from ..risk import Risk, sentences
 from .checks import closures, consistency, flexible_bodies, input_warnings, user_types
 from .files import to_toml

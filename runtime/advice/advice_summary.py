@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from mstmm.defaults import METHOD, RTOL
-from mstmm.safe_text import abbreviate_names
+from mstmm.display import abbreviate_names
 from mstmm.scene import Scene
 
 from ..chart.chart_points import Point, Setting

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from html import escape
 
-from mstmm.safe_text import escape_control_characters
+from mstmm.display import escape_control_characters
 
 from .chart_points import Skipped
 from .chart_record import ChartRecord

@@ -8,9 +8,9 @@ from pathlib import Path
 from textwrap import wrap
 from typing import Any
 
+from mstmm.display import escape_control_characters
 from mstmm.errors import SceneError
 from mstmm.optional_packages import figure_class
-from mstmm.safe_text import escape_control_characters
 
 from ..platform_support.safe_files import replace_atomically
 from .chart_record import ChartRecord

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
+from mstmm.expression.derivatives import Inputs
 from mstmm.expression.expression import Expression
-from mstmm.expression.inputs import Inputs
 from mstmm.scene import Scene
 from mstmm.scene.tables.chain import Hinges
 from mstmm.scene.tables.hinge import Hinge, HingeTable

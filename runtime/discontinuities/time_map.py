@@ -15,8 +15,7 @@ import numpy as np
 
 from mstmm.array_validation import Array
 from mstmm.errors import SceneError
-from mstmm.expression.drive import jump_message
-from mstmm.expression.inputs import Inputs
+from mstmm.expression.derivatives import Inputs, jump_message
 from mstmm.numerics.piecewise_polynomial import discontinuities
 from mstmm.risk import Risk
 

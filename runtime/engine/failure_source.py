@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mstmm.array_validation import Array
-from mstmm.expression.derivative import expression_derivatives
-from mstmm.expression.drive import motion_at
+from mstmm.expression.derivatives import expression_derivatives, motion_at
 from mstmm.expression.expression import Expression, Name
 from mstmm.scene.checks.connectivity import resolve_coordinate
 

@@ -6,7 +6,7 @@ from functools import cache
 from importlib.resources import files
 
 from mstmm.ir import KernelIR
-from mstmm.ir.json_format import kernel_from_json
+from mstmm.ir.element_spec import kernel_from_json
 
 
 @cache

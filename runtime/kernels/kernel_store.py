@@ -22,9 +22,8 @@ import cffi
 
 from mstmm.abi import element_library as abi
 from mstmm.errors import ElementError, EnvironmentFailure
-from mstmm.ir.element_spec import ElementSpec
+from mstmm.ir.element_spec import ElementSpec, element_from_json, element_to_json, kernel_from_json
 from mstmm.ir.hinge_properties import builtin_hinges, is_same_motion
-from mstmm.ir.json_format import element_from_json, element_to_json, kernel_from_json
 from mstmm.ir.tape import compile_tape
 from mstmm.scene import Scene
 from mstmm.scene.checks.user_types import used_types

@@ -18,7 +18,7 @@ import numpy as np
 
 from mstmm.array_validation import Array
 from mstmm.errors import SceneError
-from mstmm.expression.derivative import expression_derivatives
+from mstmm.expression.derivatives import expression_derivatives
 from mstmm.expression.expression import Expression
 
 from ..engine.looped_engine import LoopedEngine

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from mstmm.array_validation import Array
-from mstmm.expression.inputs import INPUTS
+from mstmm.expression.derivatives import INPUTS
 
 from ..engine.engine_calls import Probe
 from ..engine.looped_engine import LoopedEngine

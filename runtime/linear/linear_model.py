@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 
 from mstmm.argument_validation import abbreviate
 from mstmm.array_validation import Array
+from mstmm.display import PublicMembers
 from mstmm.errors import SceneError
-from mstmm.public_members import PublicMembers
 from mstmm.risk import Risk
 
 from ..packing.coordinate_layout import check_dense_size

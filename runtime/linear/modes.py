@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mstmm.array_validation import Array, finite_float
+from mstmm.display import PublicMembers, abbreviate_names
 from mstmm.errors import SceneError
-from mstmm.public_members import PublicMembers
 from mstmm.risk import AssessedResult, Risk, information
-from mstmm.safe_text import abbreviate_names
 
 from ..engine.characteristic_scales import scene_length
 from ..risk_checks.shape_range import motion_range_risks, shape_limits

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mstmm.array_validation import Array
+from mstmm.display import abbreviate_names
 from mstmm.risk import RUN, Risk, information
-from mstmm.safe_text import abbreviate_names
 
 from ..risk_checks.state_risks import find_state_risks
 from .input_channels import GROUND, Channel

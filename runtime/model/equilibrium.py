@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mstmm.array_validation import Array
+from mstmm.display import abbreviate_names
 from mstmm.errors import NumericalFailure
 from mstmm.risk import AssessedResult, DeferredRisks, Risk
-from mstmm.safe_text import abbreviate_names
 
 from ..engine.characteristic_scales import scene_length, speed_scales
 from ..engine.engine_calls import Probe

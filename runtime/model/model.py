@@ -13,9 +13,8 @@ from numpy.typing import ArrayLike
 from mstmm.argument_validation import require_bool
 from mstmm.array_validation import Array, batch, finite_float, integer, single_state, split_state
 from mstmm.defaults import ATOL, METHOD, RTOL
+from mstmm.display import NotebookDisplay, PublicMembers, table
 from mstmm.errors import NumericalFailure
-from mstmm.notebook_html import NotebookDisplay, table
-from mstmm.public_members import PublicMembers
 from mstmm.risk import Risk
 
 from ..engine.input_values import InputValue

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Never, Self
 import numpy as np
 
 from mstmm.array_validation import Array, finite_float, mapping_by_name
+from mstmm.display import PublicMembers
 from mstmm.errors import NumericalFailure, SceneError
-from mstmm.public_members import PublicMembers
 from mstmm.risk import Risk, sentences
 from mstmm.scene.validators.validation_messages import did_you_mean
 

@@ -7,8 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from mstmm.numerics.pose import Pose
-from mstmm.numerics.rotations import Matrix
+from mstmm.numerics.rotations import Matrix, Pose
 from mstmm.scene import Body, Hinge
 from mstmm.scene.checks.topology import BodyRow, Topology
 from mstmm.scene.tables.hinge_frames import hinge_frames, parameters_from_keys

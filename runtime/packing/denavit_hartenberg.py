@@ -15,8 +15,7 @@ from __future__ import annotations
 import math
 
 from mstmm.ir.hinge_properties import builtin_hinges
-from mstmm.numerics.pose import Pose
-from mstmm.numerics.rotations import Matrix, Vector, dot, from_rpy, norm, product, rotate
+from mstmm.numerics.rotations import Matrix, Pose, Vector, dot, from_rpy, norm, product, rotate
 from mstmm.scene import Hinge
 from mstmm.scene.tables.hinge_frames import hinge_frames
 

@@ -6,9 +6,8 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from mstmm.errors import SceneError
-from mstmm.expression.drive import motion
+from mstmm.expression.derivatives import INPUTS, input_node, motion
 from mstmm.expression.expression import Expression, Name
-from mstmm.expression.inputs import INPUTS, input_node
 from mstmm.ir import KernelIR, Port
 from mstmm.ir.graph import Graph, Node
 from mstmm.ir.tape import Tape, compile_tape

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mstmm import ir
-from mstmm.expression.inputs import INPUTS
+from mstmm.expression.derivatives import INPUTS
 from mstmm.ir import KernelIR, Operand, Port, Statement
 from mstmm.ir import scene_structure as code
 from mstmm.ir.scene_structure import Entries, Entry, Structure

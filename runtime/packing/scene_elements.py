@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from mstmm.errors import SceneError
-from mstmm.ir.param import Param
+from mstmm.ir.hinge_properties import Param
 from mstmm.ir.scene_structure import Key
 from mstmm.scene import Hinge
 

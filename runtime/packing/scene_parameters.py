@@ -13,7 +13,7 @@ from typing import Any
 
 from mstmm.array_validation import finite_float, mapping_by_name
 from mstmm.errors import SceneError
-from mstmm.expression.drive import motion_at
+from mstmm.expression.derivatives import motion_at
 from mstmm.scene import Scene
 from mstmm.scene.checks.user_types import copy_definitions
 from mstmm.scene.files import to_toml

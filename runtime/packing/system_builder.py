@@ -7,11 +7,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from mstmm.expression.derivatives import Inputs
 from mstmm.expression.expression import Expression
-from mstmm.expression.inputs import Inputs
 from mstmm.ir import Port
-from mstmm.ir.hinge_properties import builtin_hinges
-from mstmm.ir.param import Param
+from mstmm.ir.hinge_properties import Param, builtin_hinges
 from mstmm.scene import Hinge, Scene, split_reference
 from mstmm.scene.checks.topology import Topology, build_topology
 from mstmm.scene.tables.hinge import HingeTable

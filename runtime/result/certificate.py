@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from mstmm.array_validation import finite_float
-from mstmm.notebook_html import NotebookDisplay, table
+from mstmm.display import NotebookDisplay, table
 from mstmm.plain_data import stored_as
 from mstmm.risk import Risk, order_risks, sentences
 

@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from mstmm.argument_validation import require_path
-from mstmm.notebook_html import NotebookDisplay, table
-from mstmm.public_members import PublicMembers
+from mstmm.display import NotebookDisplay, PublicMembers, table
 
 from .certificate import Certificate
 from .result_record import Record

@@ -9,8 +9,8 @@ import numpy as np
 
 from mstmm.array_validation import Array
 from mstmm.errors import ExpressionError, NumericalFailure, SceneError
+from mstmm.expression.derivatives import input_node
 from mstmm.expression.expression import Expression, Name, parse
-from mstmm.expression.inputs import input_node
 from mstmm.ir import Port
 from mstmm.ir.graph import Graph, Node
 from mstmm.ir.tape import compile_tape

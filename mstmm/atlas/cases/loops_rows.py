@@ -10,10 +10,8 @@ import numpy as np
 
 from ...array_validation import Array
 from ...errors import NumericalFailure, SceneError
-from ...graph.mechanism_graph import GROUND, Edge, MechanismGraph
-from ...graph.spanning_tree import spanning_tree
-from ...graph.tree_growth import Tree, breadth_first_tree
-from ...graph.tree_paths import total_cost
+from ...graph.mechanism_graph import GROUND, Edge, MechanismGraph, Tree, total_cost
+from ...graph.spanning_tree import breadth_first_tree, spanning_tree
 from ...pipeline.extended_precision import extended_precision_accelerations, relative_error
 from ...runtime.engine.looped_engine import LoopedEngine
 from ...runtime.engine.loops.loop_calls import LoopCalls

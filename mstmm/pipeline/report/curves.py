@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...notebook_html import text
+from ...display import text
 from ...optional_packages import missing_package_error
 
 if TYPE_CHECKING:

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ...argument_validation import abbreviate, optional_text, require_path, require_texts
+from ...display import collapsible, text
 from ...errors import ElementError, SceneError
-from ...notebook_html import collapsible, text
 from ...scene.checks.user_types import used_types
 from . import summary_tables
 from .curves import curves_html

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from math import log10
 from typing import TYPE_CHECKING
 
-from ...notebook_html import bullets, collapsible, table, text
+from ...display import bullets, collapsible, table, text
 
 if TYPE_CHECKING:
     from ...runtime.result.result import Result

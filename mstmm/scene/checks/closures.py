@@ -7,8 +7,13 @@ from collections.abc import Collection, Iterator
 from typing import TYPE_CHECKING
 
 from ...errors import ExpressionError
-from ...expression.derivative import dependency_parts, expression_derivatives
-from ...expression.drive import motion, motion_at, node_value
+from ...expression.derivatives import (
+    dependency_parts,
+    expression_derivatives,
+    motion,
+    motion_at,
+    node_value,
+)
 from ...expression.expression import Expression, Name
 from ...expression.parser import context_of_name
 from ...ir.graph import Graph

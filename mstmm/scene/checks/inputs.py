@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator
 from typing import TYPE_CHECKING
 
 from ...errors import ExpressionError
-from ...expression.drive import motion_at
+from ...expression.derivatives import motion_at
 from ...expression.expression import SWITCHES, Expression
 from ...risk import Risk
 from ..tables.inputs import Input

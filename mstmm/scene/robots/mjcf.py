@@ -11,9 +11,11 @@ from collections.abc import Iterator
 from typing import Any
 
 from ...errors import SceneError
-from ...numerics.pose import IDENTITY_POSE, ZERO, Pose
 from ...numerics.rotations import (
+    IDENTITY_POSE,
+    ZERO,
     Matrix,
+    Pose,
     Vector,
     from_quaternion,
     product,

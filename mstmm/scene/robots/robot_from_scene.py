@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...argument_validation import abbreviate
 from ...errors import SceneError
-from ...numerics.pose import IDENTITY_POSE, Pose
-from ...numerics.rotations import perpendicular_vector, product, transpose
+from ...numerics.rotations import IDENTITY_POSE, Pose, perpendicular_vector, product, transpose
 from ..checks.topology import build_topology
 from ..scene import Scene
 from ..validators.scalars_and_vectors import GROUND

@@ -8,8 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from ...errors import SceneError
-from ...numerics.pose import IDENTITY_POSE, ZERO, Pose
-from ...numerics.rotations import Matrix, Vector, product, transpose
+from ...numerics.rotations import IDENTITY_POSE, ZERO, Matrix, Pose, Vector, product, transpose
 from ..validators.rotations_and_inertia import is_rounding
 from ..validators.validation_messages import did_you_mean
 

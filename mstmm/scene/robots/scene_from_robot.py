@@ -10,8 +10,7 @@ from typing import Any
 
 from ...argument_validation import abbreviate
 from ...errors import SceneError
-from ...numerics.pose import IDENTITY_POSE, Pose
-from ...numerics.rotations import IDENTITY, to_quaternion
+from ...numerics.rotations import IDENTITY, IDENTITY_POSE, Pose, to_quaternion
 from ..files import as_toml
 from ..scene import Scene
 from ..validators.rotations_and_inertia import triangle_message

@@ -10,8 +10,7 @@ from typing import Any, NamedTuple
 
 from ...errors import SceneError
 from ...ir.hinge_properties import builtin_hinges
-from ...numerics.pose import Pose
-from ...numerics.rotations import Matrix, Vector
+from ...numerics.rotations import Matrix, Pose, Vector
 from .robot_model import ImportNote, Joint, Link, LinkTree, Mimic, Robot, Visual
 
 #: Quantity -> unit -> its size in m or kg.

@@ -15,9 +15,10 @@ from xml.etree.ElementTree import SubElement
 
 from ...argument_validation import abbreviate
 from ...errors import SceneError
-from ...numerics.pose import IDENTITY_POSE, Pose
 from ...numerics.rotations import (
+    IDENTITY_POSE,
     Matrix,
+    Pose,
     Vector,
     from_rpy,
     perpendicular_vector,

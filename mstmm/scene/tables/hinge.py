@@ -9,7 +9,7 @@ from typing import Annotated, Any, Self, TypeGuard
 from pydantic import Field, model_validator
 
 from ...errors import ExpressionError
-from ...expression.drive import jump_message, motion_at
+from ...expression.derivatives import jump_message, motion_at
 from ...expression.expression import Expression
 from ...expression.parser import context_of_name
 from ...ir.hinge_properties import HingeProperties, builtin_hinges, effort_unit

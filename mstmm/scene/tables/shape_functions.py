@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from itertools import pairwise
 
-from ...expression.drive import node_value
+from ...expression.derivatives import node_value
 from ...expression.expression import Expression, Name
 from ...ir.differentiation import derivative
 from ...ir.graph import Graph, Node

@@ -12,8 +12,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from mstmm.numerics.pose import ZERO, Pose
-from mstmm.numerics.rotations import Matrix, Vector, from_orientation
+from mstmm.numerics.rotations import ZERO, Matrix, Pose, Vector, from_orientation
 from mstmm.scene import Body, Chain, Hinge, Load, Scene, Spring, split_reference
 from mstmm.scene.validators.scalars_and_vectors import GROUND
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from mstmm.array_validation import Array
 from mstmm.ir import KernelIR
-from mstmm.ir.json_format import element_from_json
+from mstmm.ir.element_spec import element_from_json
 
 from ...kernels import numpy_kernels
 

@@ -9,18 +9,9 @@ import numpy as np
 from mstmm.array_validation import Array
 from mstmm.expression.expression import Expression, Name
 from mstmm.ir.differentiation import derivative
-from mstmm.ir.graph import Graph, Node
-
-#: NumPy function of each operation of an expression.
-_NUMPY_OPERATIONS: dict[str, Any] = {
-    "neg": np.negative, "add": np.add, "sub": np.subtract, "mul": np.multiply, "div": np.divide,
-    "pow": np.power, "sqrt": np.sqrt, "sin": np.sin, "cos": np.cos, "tan": np.tan,
-    "asin": np.arcsin, "acos": np.arccos, "atan": np.arctan, "atan2": np.arctan2,
-    "sinh": np.sinh, "cosh": np.cosh, "tanh": np.tanh, "exp": np.exp, "log": np.log,
-    "abs": np.abs, "sign": np.sign, "floor": np.floor, "min": np.minimum, "max": np.maximum,
-    "lt": np.less, "le": np.less_equal, "eq": np.equal, "and": np.logical_and,
-    "or": np.logical_or, "not": np.logical_not, "select": np.where,
-}  # fmt: skip
+from mstmm.ir.graph import Graph
+from mstmm.ir.operations import OPERATIONS
+from mstmm.ir.terms import Node, dependencies
 
 
 class ExpressionShape:
@@ -76,13 +67,8 @@ def _dotted_name(name: Name) -> str:
 
 def _switch_functions(root: Node) -> list[Node]:
     """Nodes whose sign change switches the expression."""
-    switches, seen, stack = [], set(), [root]
-    while stack:
-        node = stack.pop()
-        if node.number in seen:
-            continue
-        seen.add(node.number)
-        stack.extend(node.args)
+    switches = []
+    for node in dependencies(root):
         if node.op in ("lt", "le", "eq", "min", "max"):
             switches.append(node.args[0] - node.args[1])
         elif node.op in ("abs", "sign"):
@@ -93,17 +79,9 @@ def _switch_functions(root: Node) -> list[Node]:
 def _evaluate(root: Node, x: Array) -> Array:
     """Value of a node at every x (m)."""
     known_values: dict[int, Any] = {}
-    stack = [root]
-    while stack:
-        node = stack[-1]
-        missing = [a for a in node.args if a.number not in known_values]
-        if missing and node.number not in known_values:
-            stack.extend(missing)
-            continue
-        stack.pop()
-        if node.number not in known_values:
-            arguments = [known_values[a.number] for a in node.args]
-            known_values[node.number] = _evaluate_node(node, arguments, x)
+    for node in dependencies(root):
+        arguments = [known_values[a.number] for a in node.args]
+        known_values[node.number] = _evaluate_node(node, arguments, x)
     return np.asarray(known_values[root.number], dtype=float)
 
 
@@ -115,4 +93,4 @@ def _evaluate_node(node: Node, args: list[Any], x: Array) -> Any:
     if node.value is not None:
         return float(node.value)
     with np.errstate(all="ignore"):  # the branch not selected may be undefined
-        return _NUMPY_OPERATIONS[node.op](*args)
+        return getattr(np, OPERATIONS[node.op].numpy)(*args)

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
+from mstmm.display import escape_control_characters
 from mstmm.errors import SceneError
-from mstmm.safe_text import escape_control_characters
 
 #: Suffixes of HDF5 files.
 _HDF5 = (".h5", ".hdf5", ".hdf", ".h5m", ".med", ".cgns", ".hmf")

@@ -11,9 +11,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
+from mstmm.display import abbreviate_names
 from mstmm.errors import SceneError
 from mstmm.risk import Risk
-from mstmm.safe_text import abbreviate_names
 
 from ..input_channels import Channel
 from ..operating_point.changes import MATRICES, find_changes

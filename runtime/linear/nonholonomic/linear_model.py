@@ -22,9 +22,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import block_diag
 
 from mstmm.array_validation import Array
+from mstmm.display import abbreviate_names
 from mstmm.errors import NumericalFailure, SceneError
 from mstmm.risk import RUN, DeferredRisks, Risk
-from mstmm.safe_text import abbreviate_names
 
 from ...engine.characteristic_scales import speed_scales
 from ...risk_checks.state_risks import find_state_risks

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mstmm.array_validation import Array
+from mstmm.display import abbreviate_names
 from mstmm.errors import NumericalFailure
 from mstmm.risk import Risk, information
-from mstmm.safe_text import abbreviate_names
 
 from ...engine.characteristic_scales import speed_scales
 from ...run.start_state import initial_state

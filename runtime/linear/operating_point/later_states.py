@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mstmm.array_validation import Array
+from mstmm.display import abbreviate_names
 from mstmm.errors import NumericalFailure, SceneError
-from mstmm.safe_text import abbreviate_names
 
 from ...discontinuities.active_expressions import active_expressions
 from ...engine.characteristic_scales import speed_scales

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from mstmm.errors import SceneError
-from mstmm.expression.derivative import expression_derivatives
+from mstmm.expression.derivatives import expression_derivatives
 from mstmm.expression.expression import Expression, Name
 
 from ..input_channels import Channel

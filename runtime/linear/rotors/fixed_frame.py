@@ -22,8 +22,8 @@ import numpy as np
 from scipy.linalg import logm
 
 from mstmm.array_validation import Array, Integers
+from mstmm.display import abbreviate_names
 from mstmm.errors import SceneError
-from mstmm.safe_text import abbreviate_names
 
 from .blades import find_blades
 from .displacements import displacements

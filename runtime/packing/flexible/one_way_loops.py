@@ -15,7 +15,7 @@ import numpy as np
 from mstmm.array_validation import Array
 from mstmm.errors import SceneError
 from mstmm.graph.closure_plan import ClosurePlan
-from mstmm.graph.tree_paths import Paths
+from mstmm.graph.mechanism_graph import Paths
 from mstmm.scene import Constraint, Hinge, Scene, split_reference
 from mstmm.scene.tables.closures import ROLLING
 

@@ -9,13 +9,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from mstmm.expression.drive import motion
+from mstmm.expression.derivatives import motion
 from mstmm.ir import KernelIR, Port
 from mstmm.ir.differentiation import differentiate
 from mstmm.ir.element_spec import ElementSpec
 from mstmm.ir.graph import Graph
-from mstmm.ir.hinge_properties import HingeProperties
-from mstmm.ir.param import Param
+from mstmm.ir.hinge_properties import HingeProperties, Param
 from mstmm.ir.tape import compile_tape
 from mstmm.scene import Constraint, Hinge
 from mstmm.scene.tables.hinge import Initial

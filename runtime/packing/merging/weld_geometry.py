@@ -2,8 +2,15 @@
 
 from __future__ import annotations
 
-from mstmm.numerics.pose import IDENTITY_POSE, ZERO, Pose
-from mstmm.numerics.rotations import IDENTITY, Quaternion, Vector, to_quaternion
+from mstmm.numerics.rotations import (
+    IDENTITY,
+    IDENTITY_POSE,
+    ZERO,
+    Pose,
+    Quaternion,
+    Vector,
+    to_quaternion,
+)
 from mstmm.scene import Body, End, Hinge
 from mstmm.scene.robots.robot_model import Link, merge_inertia
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from mstmm.graph.mechanism_graph import GROUND
-from mstmm.numerics.pose import Pose
+from mstmm.numerics.rotations import Pose
 from mstmm.scene import Body, Scene
 from mstmm.scene.checks.topology import BodyRow, Topology
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mstmm.array_validation import Integers
-from mstmm.expression.inputs import INPUTS
+from mstmm.expression.derivatives import INPUTS
 from mstmm.ir import KernelIR
 from mstmm.ir.differentiation import differentiate
 from mstmm.ir.tape import compile_tape

@@ -13,9 +13,9 @@ import numpy as np
 
 from mstmm.argument_validation import abbreviate, optional_text, require_path, require_word
 from mstmm.array_validation import mapping_by_name
+from mstmm.display import escape_control_characters
 from mstmm.errors import SceneError
 from mstmm.optional_packages import figure_class
-from mstmm.safe_text import escape_control_characters
 
 from ...platform_support.safe_files import replace_atomically
 from ..flexible.shape_panels import ShapePanel, shape_panel

@@ -11,9 +11,9 @@ from typing import IO, Any
 
 import numpy as np
 
+from mstmm.display import escape_control_characters
 from mstmm.errors import EnvironmentFailure, MstmmError
 from mstmm.optional_packages import missing_package_error
-from mstmm.safe_text import escape_control_characters
 
 from .page_selector import Part
 from .projection import ProjectedFrame

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 
 from mstmm.argument_validation import optional_text, require_path, require_texts
 from mstmm.array_validation import integer
+from mstmm.display import NotebookDisplay
 from mstmm.errors import SceneError
-from mstmm.notebook_html import NotebookDisplay
 
 from ...platform_support.safe_files import replace_atomically
 from .html_page import render_page

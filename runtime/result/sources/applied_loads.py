@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mstmm.array_validation import Array
-from mstmm.expression.inputs import INPUTS
+from mstmm.expression.derivatives import INPUTS
 from mstmm.numerics.piecewise_polynomial import NUMBERS_PER_PIECE
 
 from ...engine.engine_calls import Probe

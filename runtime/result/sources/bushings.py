@@ -10,7 +10,7 @@ import numpy as np
 
 from mstmm.array_validation import Array
 from mstmm.ir import KernelIR
-from mstmm.ir.json_format import kernel_from_json
+from mstmm.ir.element_spec import kernel_from_json
 from mstmm.scene.tables.bushing import upper_triangle
 
 from ...engine.engine_calls import Probe

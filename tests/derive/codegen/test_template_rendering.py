@@ -22,9 +22,8 @@ from mstmm.derive.codegen.template_rendering import (
     write_generated,
 )
 from mstmm.ir import Assign, Constant, Guard, KernelIR, Port, Store, Temporary
-from mstmm.ir.element_spec import ElementSpec, Param
+from mstmm.ir.element_spec import ElementSpec, Param, element_from_json, element_to_json
 from mstmm.ir.graph import Graph
-from mstmm.ir.json_format import element_from_json, element_to_json
 from tests.support.kernels.c_library import build, compile_library
 from tests.support.kernels.random_kernels import element, random_kernel
 from tests.support.paths import ROOT

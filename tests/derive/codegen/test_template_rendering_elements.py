@@ -16,9 +16,8 @@ from mstmm.abi import element_library as abi
 from mstmm.derive.classical.catalogue import CLASSICAL, RUN_ELEMENTS, classical_spec
 from mstmm.derive.verification.rounding_bounds import rounding_bounds
 from mstmm.ir import KernelIR, Port
-from mstmm.ir.element_spec import ElementSpec
+from mstmm.ir.element_spec import ElementSpec, element_from_json
 from mstmm.ir.interpreter import GuardFailure, evaluate_floats
-from mstmm.ir.json_format import element_from_json
 from mstmm.ir.statements import NEGATIVE_DETERMINANT
 from mstmm.ir.tape import compile_tape
 from mstmm.runtime.kernels import prebuilt_kernels

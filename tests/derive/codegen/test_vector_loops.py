@@ -11,10 +11,9 @@ from mstmm.abi.element_library import c_kernels
 from mstmm.derive.codegen.template_rendering import element_source
 from mstmm.derive.codegen.vector_loops import VECTORIZED_OUTPUTS
 from mstmm.ir import KernelIR, Port
-from mstmm.ir.element_spec import ElementSpec
+from mstmm.ir.element_spec import ElementSpec, element_from_json
 from mstmm.ir.graph import Graph, Node
 from mstmm.ir.interpreter import evaluate_floats
-from mstmm.ir.json_format import element_from_json
 from tests.support.kernels.c_library import build
 from tests.support.kernels.random_kernels import element
 from tests.support.paths import ROOT

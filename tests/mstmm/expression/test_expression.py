@@ -9,7 +9,7 @@ import sys
 import pytest
 
 from mstmm.errors import ExpressionError
-from mstmm.expression.drive import node_value
+from mstmm.expression.derivatives import node_value
 from mstmm.expression.expression import Expression, Name, number, parse
 from mstmm.expression.parser import FUNCTIONS
 from mstmm.ir.graph import Graph, Node

@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from mstmm.errors import ExpressionError
-from mstmm.expression.drive import node_value
+from mstmm.expression.derivatives import node_value
 from mstmm.expression.expression import parse
 from mstmm.ir.graph import Graph
 

@@ -5,10 +5,14 @@ from __future__ import annotations
 import pytest
 
 from mstmm.graph.closure_plan import closure_plan
-from mstmm.graph.mechanism_graph import GROUND, Edge, MechanismGraph
-from mstmm.graph.spanning_tree import improve_by_swaps, spanning_tree
-from mstmm.graph.tree_growth import breadth_first_tree, depth_first_tree, random_tree
-from mstmm.graph.tree_paths import Paths, total_cost
+from mstmm.graph.mechanism_graph import GROUND, Edge, MechanismGraph, Paths, total_cost
+from mstmm.graph.spanning_tree import (
+    breadth_first_tree,
+    depth_first_tree,
+    improve_by_swaps,
+    random_tree,
+    spanning_tree,
+)
 from tests.support.graph import exhaustive_search as reference
 from tests.support.graph.mechanisms import (
     four_bars,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from mstmm.graph.mechanism_graph import GROUND, Edge, MechanismGraph
+from mstmm.graph.spanning_tree import grow_tree
 from mstmm.graph.tree_errors import (
     AllHingesCut,
     ConflictingTreeHinges,
@@ -14,7 +15,6 @@ from mstmm.graph.tree_errors import (
     WrongHingeDirection,
     tree_problems,
 )
-from mstmm.graph.tree_growth import grow_tree
 from tests.support.graph.mechanisms import pins, random_mechanism
 
 CUT, KEPT = True, False

@@ -10,12 +10,12 @@ import pytest
 from mstmm.ir import KernelIR, Port
 from mstmm.ir.hinge_properties import (
     HingeProperties,
+    Param,
     builtin_hinges,
     hinge_properties,
     hinge_properties_from_data,
     hinge_properties_to_data,
 )
-from mstmm.ir.param import Param
 from mstmm.ir.statements import Assign, Constant, Element, Store, Temporary
 from mstmm.scene.tables.hinge import Hinge
 from mstmm.scene.tables.hinge_frames import initial_motion_axes

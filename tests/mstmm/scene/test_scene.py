@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from mstmm.ir.element_spec import element_from_json
 from mstmm.ir.hinge_properties import builtin_hinges, effort_unit
-from mstmm.ir.json_format import element_from_json
 from mstmm.numerics.rotations import norm
 from mstmm.scene import Hinge, Scene, load_scene
 from mstmm.scene.tables.law import SpringLaw

@@ -8,7 +8,7 @@ from functools import cache
 import pytest
 
 import mstmm
-from mstmm.expression.derivative import expression_derivatives
+from mstmm.expression.derivatives import expression_derivatives
 from mstmm.expression.expression import parse
 from mstmm.runtime.integrate.c_loop import Status
 from mstmm.runtime.integrate.steppers import IMPLICIT, get

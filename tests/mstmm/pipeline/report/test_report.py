@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 import mstmm
-from mstmm import notebook_html
+from mstmm import display
 from mstmm.errors import SceneError
 from mstmm.pipeline.report import summary_tables
 from tests.support.scenes import view as scenes
@@ -102,10 +102,8 @@ def test_refusals(tmp_path: Path) -> None:
 
 
 def test_everything_is_escaped() -> None:
-    made = notebook_html.table([("<script>", "a & b")], ("<i>",)) + notebook_html.bullets(
-        ["</ul><b>"]
-    )
-    made += notebook_html.collapsible("<x>", "")
+    made = display.table([("<script>", "a & b")], ("<i>",)) + display.bullets(["</ul><b>"])
+    made += display.collapsible("<x>", "")
     assert "<script>" not in made
     assert "<i>" not in made
     assert "<b>" not in made

@@ -1,11 +1,24 @@
-"""HTML for notebooks and reports: escaped text, tables, lists, and bundles of formats."""
+"""What public objects show: printable text, HTML for notebooks and reports, members by group."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from html import escape
+from typing import ClassVar
 
-from .safe_text import escape_control_characters
+
+def abbreviate_names(names: Sequence[str], count: int = 4) -> str:
+    """First `count` names on one line, and the number of the others."""
+    rest_count = len(names) - count
+    return ", ".join(names[:count]) + (f" and {rest_count} more" if rest_count > 0 else "")
+
+
+def escape_control_characters(text: str) -> str:
+    """Escape control characters of a text, which a terminal might execute."""
+    return "".join(c if c.isprintable() or c == "\n" else ascii(c)[1:-1] for c in text)
+
+
+# --- HTML for notebooks and reports ---------------------------------------------------------------
 
 
 def text(words: object) -> str:
@@ -53,3 +66,25 @@ class NotebookDisplay:
         }
         kinds = set(include or builders) - set(exclude or ())
         return {kind: build() for kind, build in builders.items() if build and kind in kinds}
+
+
+# --- members of public objects --------------------------------------------------------------------
+
+
+class PublicMembers:
+    """Base of classes whose `dir` lists only the members that users call.
+
+    A subclass names them by group in `member_groups`; all others are for other packages of mstmm
+    and may change.
+    """
+
+    member_groups: ClassVar[Mapping[str, str]]
+
+    @classmethod
+    def public_members(cls) -> dict[str, tuple[str, ...]]:
+        """Names of the public members by group."""
+        return {group: tuple(names.split()) for group, names in cls.member_groups.items()}
+
+    def __dir__(self) -> list[str]:
+        public = (name for names in self.public_members().values() for name in names)
+        return sorted({*public, *(name for name in super().__dir__() if name.startswith("_"))})

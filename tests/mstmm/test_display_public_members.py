@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import mstmm
-from mstmm.public_members import PublicMembers
+from mstmm.display import PublicMembers
 from mstmm.runtime.linear.linear_model import Linear
 from mstmm.runtime.linear.modes import Modes
 from mstmm.runtime.model.session import Session

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import mpmath as mp
 import pytest
 
-from mstmm.expression.drive import motion_at
+from mstmm.expression.derivatives import motion_at
 from mstmm.expression.expression import parse
 from mstmm.expression.parser import Term
 
