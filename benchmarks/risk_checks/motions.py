@@ -9,7 +9,7 @@ import numpy as np
 import mstmm
 from mstmm.atlas.error_measures import refinement_correction
 from mstmm.atlas.shared_scenes import rod, spinning_top
-from mstmm.runtime.engine.eigenvalues import fastest_eigenvalue
+from mstmm.runtime.engine.jacobian import fastest_eigenvalue
 
 from .trials import Scene, Trial, build_model, coordinate_error, run_trial, trial
 

@@ -137,7 +137,7 @@ def with_inputs(scene: Scene, texts: Sequence[str]) -> Scene:
 
     MstmmError for an invalid text, SceneError for an input or signal that the scene does not have.
     """
-    from mstmm.runtime.engine import input_values as inputs
+    from mstmm.runtime.engine import inputs
 
     values: dict[str, float | str] = {}
     for text in texts:

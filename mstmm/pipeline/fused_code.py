@@ -32,8 +32,9 @@ from ..runtime.libraries.cache import BuiltLibrary, Recipe, find, open_cached_li
 from ..runtime.packing.fused_structure import structure_of
 
 if TYPE_CHECKING:
+    from mstmm.runtime.engine.inputs import IndexPairs
+
     from ..derive.fuse.scene_kernels import FusedSceneIR
-    from ..runtime.engine.live_inputs import IndexPairs
     from ..runtime.linear.linear_equations import LinearEquations
     from ..runtime.linear.symbolic_matrices import SymbolicLinearModel
     from ..runtime.packing.packed_scene import PackedScene

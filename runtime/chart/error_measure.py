@@ -9,7 +9,7 @@ import numpy as np
 
 from mstmm.array_validation import Array
 
-from ..engine.characteristic_scales import scene_length
+from ..engine.compiled_scene import scene_length
 from ..result.error_measure import Coordinates, Measure, Quantities
 
 if TYPE_CHECKING:

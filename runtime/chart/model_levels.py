@@ -14,7 +14,7 @@ from mstmm.scene import Names, Scene
 from mstmm.scene.tables.beam import DIRECTIONS, Beam, Modes, Shapes
 from mstmm.scene.tables.elastic import Elastic
 
-from ..engine.body_references import BodyReferences
+from ..engine.quantity_registry import BodyReferences
 from ..flexible.beam.modal_beams import BeamBodies
 from ..flexible.elastic.modal_elastic import AUTO_MODES
 from ..packing.flexible.rigid_substitution import LEVELS

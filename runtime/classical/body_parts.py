@@ -13,7 +13,7 @@ import numpy as np
 
 from mstmm.array_validation import Array
 
-from ..engine.engine_calls import Probe
+from ..engine.looped_engine import Probe
 from ..flexible.modal_body import ModalBody
 from ..flexible.modal_port import ModalPort
 from ..packing.flexible.expansion import HELD

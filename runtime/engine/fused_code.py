@@ -10,7 +10,7 @@ import numpy as np
 
 from mstmm.array_validation import Array
 
-from .live_inputs import IndexPairs
+from .inputs import IndexPairs
 
 if TYPE_CHECKING:
     from ..kernels.derivative_library import DerivativeLibrary

@@ -174,10 +174,8 @@ def _independent_groups(
     whose motion it depends; `speeds` are the speeds of each part.
     """
     groups = _order_groups(sorted(set(moving)), {frozenset(dependency) for dependency in feeling})
-    members, readers = (
-        {name: list[int]() for name in groups},
-        {name: list[int]() for name in groups},
-    )
+    members = {name: list[int]() for name in groups}
+    readers = {name: list[int]() for name in groups}
     for k, (name, felt_groups) in enumerate(zip(moving, feeling, strict=True)):
         members[name].append(k)
         for other_group in felt_groups & members.keys():
@@ -231,10 +229,10 @@ def _find_passes(
     passes, passes_of_group = list[list[int]](), {name: set[int]() for name in members}
     for name, own_members in members.items():
         dependent_groups = set[int]().union(*(feeling[k] for k in readers[name])) & members.keys()
-        used_passes, pass_index = (
-            set[int]().union(*(passes_of_group[other_group] for other_group in dependent_groups)),
-            0,
+        used_passes = set[int]().union(
+            *(passes_of_group[other_group] for other_group in dependent_groups)
         )
+        pass_index = 0
         for k in own_members:
             while pass_index in used_passes:
                 pass_index += 1

@@ -22,7 +22,7 @@ from mstmm.expression.derivatives import expression_derivatives
 from mstmm.expression.expression import Expression
 
 from ..engine.looped_engine import LoopedEngine
-from ..engine.observation_columns import acceleration_name, rate_unit
+from ..engine.quantity_registry import acceleration_name, rate_unit
 from ..engine.tangent_matrix import TangentMatrix
 from ..packing.coordinate_layout import HingeSlots
 from ..packing.loops.system_variants import without_drives

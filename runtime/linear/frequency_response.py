@@ -20,8 +20,8 @@ from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure, SceneError
 from mstmm.risk import AssessedResult, DeferredRisks, Risk
 
-from ..engine.characteristic_scales import speed_scales
-from ..engine.harmonic_response import HarmonicResponse
+from ..engine.compiled_scene import speed_scales
+from ..engine.tangent_matrix import HarmonicResponse
 from ..risk_checks.shape_range import response_range_risks
 from . import file_formats
 from .harmonic.damping_checks import (

@@ -14,8 +14,7 @@ import numpy as np
 from mstmm.array_validation import Array
 from mstmm.expression.derivatives import INPUTS
 
-from ..engine.engine_calls import Probe
-from ..engine.looped_engine import LoopedEngine
+from ..engine.looped_engine import LoopedEngine, Probe
 from ..engine.state_evaluation.kinematics import point_motions
 from ..kernels.tape_kernel import TapeKernel
 from ..packing.expression_tapes import constant_kernel

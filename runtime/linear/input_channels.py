@@ -24,9 +24,8 @@ from mstmm.scene.tables.inputs import Input
 from mstmm.scene.validators.validation_messages import did_you_mean
 
 from ..discontinuities.active_expressions import active_expressions
-from ..engine.body_references import BodyReferences
 from ..engine.looped_engine import LoopedEngine
-from ..engine.observation_columns import acceleration_name, effort_names
+from ..engine.quantity_registry import BodyReferences, acceleration_name, effort_names
 from ..engine.tangent_matrix import TangentMatrix
 from ..packing.expression_tapes import constant_kernel
 from ..packing.scene_packing import packed_system

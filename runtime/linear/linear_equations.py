@@ -27,7 +27,7 @@ from .operating_point.friction import DryFriction
 from .rotors.frame_transform import FrameTransform
 
 if TYPE_CHECKING:
-    from ..engine.compiled_linearisation import CompiledState
+    from ..engine.compiled_derivatives import CompiledState
     from ..engine.compiled_scene import CompiledScene
     from ..engine.looped_engine import LoopedEngine
     from .symbolic_matrices import SymbolicLinearModel

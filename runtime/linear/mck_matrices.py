@@ -19,7 +19,7 @@ import numpy as np
 from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure
 
-from ..engine.failure_source import find_nonfinite_derivative
+from ..engine.failure_messages import find_nonfinite_derivative
 from ..engine.looped_engine import LoopedEngine
 from ..engine.tangent_matrix import thread_tangent
 

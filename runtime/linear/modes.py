@@ -16,7 +16,7 @@ from mstmm.display import PublicMembers, abbreviate_names
 from mstmm.errors import SceneError
 from mstmm.risk import AssessedResult, Risk, information
 
-from ..engine.characteristic_scales import scene_length
+from ..engine.compiled_scene import scene_length
 from ..risk_checks.shape_range import motion_range_risks, shape_limits
 from . import energy_shares, file_formats
 from .rotors.displacements import whirl

@@ -22,8 +22,8 @@ from mstmm.argument_validation import abbreviate
 from mstmm.array_validation import Array, batch, copy_to
 from mstmm.errors import NumericalFailure, SceneError
 
-from ..engine.live_inputs import LiveInputs
-from ..engine.tangent_kernels import TangentKernels
+from ..engine.compiled_derivatives import TangentKernels
+from ..engine.inputs import LiveInputs
 from ..packing.fused_structure import structure_of
 from ..packing.parameter_derivatives import parameter_derivatives
 

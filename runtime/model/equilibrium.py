@@ -12,13 +12,10 @@ from mstmm.display import abbreviate_names
 from mstmm.errors import NumericalFailure
 from mstmm.risk import AssessedResult, DeferredRisks, Risk
 
-from ..engine.characteristic_scales import scene_length, speed_scales
-from ..engine.engine_calls import Probe
-from ..engine.statics.pseudo_transient_equilibrium import MAX_STEPS
-from ..engine.statics.static_equilibrium import (
-    EquilibriumNotFoundError,
-    UndeterminedEquilibriumError,
-)
+from ..engine.compiled_scene import scene_length, speed_scales
+from ..engine.looped_engine import Probe
+from ..engine.pseudo_transient_equilibrium import MAX_STEPS
+from ..engine.static_equilibrium import EquilibriumNotFoundError, UndeterminedEquilibriumError
 from ..risk_checks.state_risks import find_state_risks
 from ..run.scene_system import SceneSystem
 from .equilibrium_search import MAX_INDEPENDENT, EquilibriumSearch, Progress

@@ -13,20 +13,24 @@ from numpy.typing import NDArray
 from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure, SceneError
 
-from ..engine.characteristic_scales import scene_length, speed_scales, total_mass
+from ..engine.compiled_scene import scene_length, speed_scales, total_mass
 from ..engine.looped_engine import LoopedEngine
 from ..engine.loops.independent_speeds import IndependentSpeeds
 from ..engine.loops.loop_calls import LoopCalls
-from ..engine.statics.pseudo_transient_equilibrium import PseudoTransientEquilibrium
-from ..engine.statics.shifted_stiffness import ShiftedStiffness
-from ..engine.statics.stability import Stability, find_stability
-from ..engine.statics.static_equilibrium import (
+from ..engine.pseudo_transient_equilibrium import (
+    PseudoTransientEquilibrium,
+    ShiftedStiffness,
+    Stability,
+    find_stability,
+)
+from ..engine.static_equilibrium import (
+    FARTHEST,
     EquilibriumNotFoundError,
     EquilibriumProblem,
     find_equilibrium,
+    find_unbalanced_motion,
     unstable_coordinates,
 )
-from ..engine.statics.unbalanced_loads import FARTHEST, find_unbalanced_motion
 from ..engine.tangent_matrix import TangentMatrix
 from ..packing.loops.system_variants import with_rotors
 from ..packing.scene_packing import packed_system

@@ -11,7 +11,7 @@ from mstmm.array_validation import Array
 from mstmm.errors import MstmmError
 
 from ..discontinuities.active_expressions import active_expressions
-from ..engine.engine_calls import Probe
+from ..engine.looped_engine import Probe
 from ..run.scene_system import SceneSystem
 
 if TYPE_CHECKING:

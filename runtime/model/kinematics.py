@@ -12,12 +12,12 @@ from mstmm.array_validation import Array, batch, copy_to
 from mstmm.errors import NumericalFailure
 
 from ..engine.compiled_scene import CompiledScene
-from ..engine.observation_columns import POINT_COLUMNS, SUMS
-from ..engine.state_evaluation.steady_motion import move_steadily
+from ..engine.quantity_registry import POINT_COLUMNS, SUMS
+from ..engine.state_evaluation.state_calls import move_steadily
 
 if TYPE_CHECKING:
     from ..engine.state_evaluation.kinematics import Brackets, Kinematics, Names
-    from ..engine.state_evaluation.single_state import SingleStateCalls
+    from ..engine.state_evaluation.state_calls import SingleStateCalls
     from .derivatives import Differentiation
 
 _AXES = slice(15, 24)
@@ -238,7 +238,7 @@ class KinematicQueries(CompiledScene):
 
     @cached_property
     def _kinematics(self) -> Kinematics:
-        from ..engine.body_references import BodyReferences
+        from ..engine.quantity_registry import BodyReferences
         from ..engine.state_evaluation.kinematics import Kinematics
 
         references = BodyReferences(self.scene.skeleton)
@@ -246,6 +246,6 @@ class KinematicQueries(CompiledScene):
 
     @cached_property
     def _single_state(self) -> SingleStateCalls:
-        from ..engine.state_evaluation.single_state import SingleStateCalls
+        from ..engine.state_evaluation.state_calls import SingleStateCalls
 
         return SingleStateCalls(self.looped, self.fusion)

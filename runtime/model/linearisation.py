@@ -12,7 +12,7 @@ import numpy as np
 from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure
 
-from ..engine.characteristic_scales import speed_scales
+from ..engine.compiled_scene import speed_scales
 from ..linear.input_channels import GROUND, Channel, input_channels, inputs_of
 from ..linear.linear_model import Linear
 from ..linear.loops.constrained_linearisation import mechanism_at, mechanism_in_motion

@@ -17,7 +17,7 @@ from mstmm.display import NotebookDisplay, PublicMembers, table
 from mstmm.errors import NumericalFailure
 from mstmm.risk import Risk
 
-from ..engine.input_values import InputValue
+from ..engine.inputs import InputValue
 from ..integrate.methods import Method, to_method
 from ..integrate.settings import Settings, to_output_times, validate
 from .execution import Execution, check_execution

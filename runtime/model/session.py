@@ -17,7 +17,7 @@ from mstmm.risk import Risk, sentences
 from mstmm.scene.validators.validation_messages import did_you_mean
 
 from ..discontinuities.active_expressions import active_expressions
-from ..engine.input_update import with_held_inputs, with_input_values
+from ..engine.inputs import with_held_inputs, with_input_values
 from ..engine.looped_engine import LoopedEngine
 from ..integrate.c_loop import Integrator, Samples, Status
 from ..integrate.settings import Settings

@@ -22,8 +22,8 @@ from ..packing.coordinate_layout import check_dense_size
 from .kinematics import KinematicQueries
 
 if TYPE_CHECKING:
-    from ..engine.mass_matrix_solver import MassMatrixSolver
-    from ..engine.state_evaluation.single_state import SingleStateCalls
+    from ..engine.compiled_derivatives import MassMatrixSolver
+    from ..engine.state_evaluation.state_calls import SingleStateCalls
     from .derivatives import Derivatives
 
 
@@ -57,7 +57,7 @@ class DynamicsQueries(KinematicQueries):
             single: Array | None = calls.accelerations(t, q, u, efforts)
             if single is not None:
                 return single if out is None else copy_to(out, single)
-        from ..engine.state_evaluation.state_batch import StateBatch, accelerations
+        from ..engine.state_evaluation.state_calls import StateBatch, accelerations
 
         extra = () if efforts is None else (("efforts", efforts, self.nu),)
         lead, given = batch(("t", t, None), ("q", q, self.nq), ("u", u, self.nu), *extra)
@@ -160,7 +160,7 @@ class DynamicsQueries(KinematicQueries):
     @cached_property
     def _gravity_calls(self) -> SingleStateCalls:
         from ..engine.fused_code import NoFusedCode
-        from ..engine.state_evaluation.single_state import SingleStateCalls
+        from ..engine.state_evaluation.state_calls import SingleStateCalls
 
         return SingleStateCalls(self.looped.gravity_only, NoFusedCode())
 
@@ -213,7 +213,7 @@ class DynamicsQueries(KinematicQueries):
 
     @cached_property
     def _solver(self) -> MassMatrixSolver:
-        from ..engine.mass_matrix_solver import MassMatrixSolver
+        from ..engine.compiled_derivatives import MassMatrixSolver
 
         return MassMatrixSolver(self.looped, self.fusion)
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from mstmm.array_validation import Array
 from mstmm.scene import Hinge, Scene
 
-from ..engine.characteristic_scales import total_mass, total_weight
+from ..engine.compiled_scene import total_mass, total_weight
 from .certificate_data import Drift
 from .impacts import momentum_kept_by_impacts
 from .result_record import Record

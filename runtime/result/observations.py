@@ -15,8 +15,8 @@ import numpy as np
 from mstmm.argument_validation import require_word
 from mstmm.array_validation import Array
 
-from ..engine.body_references import BodyReferences
-from ..engine.engine_calls import OBSERVATION_PARTS, Probe
+from ..engine.looped_engine import OBSERVATION_PARTS, Probe
+from ..engine.quantity_registry import BodyReferences
 
 if TYPE_CHECKING:
     from ..engine.compiled_scene import CompiledScene

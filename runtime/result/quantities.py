@@ -18,7 +18,7 @@ from mstmm.errors import SceneError
 from mstmm.scene import Output
 from mstmm.scene.validators.validation_messages import did_you_mean
 
-from ..engine.observation_columns import (  # fmt: skip
+from ..engine.quantity_registry import (  # fmt: skip
     BODY_QUANTITIES,
     POINT_COLUMNS,
     SUMS,

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from mstmm.array_validation import Array
 
-from ..engine.observation_columns import QuantityKind
+from ..engine.quantity_registry import QuantityKind
 
 Values = Callable[[], Array]
 

@@ -17,14 +17,13 @@ from mstmm.ir.tape import compile_tape
 from mstmm.scene import Output
 from mstmm.scene.validators.validation_messages import did_you_mean
 
-from ..engine.body_references import BodyReferences
-from ..engine.engine_calls import Probe
-from ..engine.looped_engine import LoopedEngine
-from ..engine.observation_columns import (
+from ..engine.looped_engine import LoopedEngine, Probe
+from ..engine.quantity_registry import (
     BODY_QUANTITIES,
     HINGE_QUANTITIES,
     POINT_COLUMNS,
     SUMS,
+    BodyReferences,
     acceleration_name,
     effort_names,
 )

@@ -12,7 +12,7 @@ import numpy as np
 from mstmm.array_validation import Array
 from mstmm.errors import MstmmError, SceneError
 
-from ..engine.failure_source import REMEDY
+from ..engine.failure_messages import REMEDY
 from ..integrate.c_loop import Integrator, Samples, Status
 from ..integrate.settings import Settings
 from ..platform_support.interrupts import record_interrupts

@@ -15,9 +15,8 @@ from mstmm.errors import NumericalFailure, SceneError
 from mstmm.ir.tape import INSTRUCTION_WIDTH, OUTPUT_WIDTH, Tape
 from mstmm.scene import Scene
 
-from ..engine.engine_calls import Probe
-from ..engine.live_inputs import IndexPairs, LiveInputs
-from ..engine.looped_engine import LoopedEngine
+from ..engine.inputs import IndexPairs, LiveInputs
+from ..engine.looped_engine import LoopedEngine, Probe
 from ..engine.tangent_matrix import TangentMatrix
 from ..kernels.fused_library import FusedLibrary
 from ..kernels.tape_kernel import c_tape

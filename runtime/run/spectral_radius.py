@@ -18,7 +18,7 @@ from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure
 from mstmm.scene import Scene
 
-from ..engine.eigenvalues import eigenvalues
+from ..engine.jacobian import eigenvalues
 from ..engine.looped_engine import LoopedEngine
 from ..engine.tangent_matrix import TangentMatrix
 from ..packing.qr_sweep import reject_qr_steps

@@ -19,7 +19,7 @@ from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure
 from mstmm.risk import Risk
 
-from ..engine.eigenvalues import MAX_DENSE_STATES, Complex, eigenvalues, fastest_eigenvalue
+from ..engine.jacobian import MAX_DENSE_STATES, Complex, eigenvalues, fastest_eigenvalue
 from ..engine.looped_engine import LoopedEngine
 from ..integrate.steppers import get
 from . import classical_run, external_integrators

@@ -10,7 +10,7 @@ import numpy as np
 from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure
 
-from ..engine.failure_source import (
+from ..engine.failure_messages import (
     describe_curve_end,
     find_nonfinite_derivative,
     find_nonfinite_expression,

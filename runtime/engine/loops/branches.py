@@ -114,11 +114,9 @@ class RequestedCoordinates:
 
     def change_toward(self, q: Array) -> Array:
         """Change (nu,) along the speeds from q to the requested coordinates."""
-        deviation, layout, change = (
-            self.deviation_of(q),
-            self.packed.layout,
-            np.zeros(self.packed.layout.nu),
-        )
+        deviation = self.deviation_of(q)
+        layout = self.packed.layout
+        change = np.zeros(self.packed.layout.nu)
         for hinge in self.packed.user_scene.hinge:
             slots = layout.hinges[hinge.name]
             if slots.nq == slots.nu:
@@ -156,10 +154,8 @@ class BranchSearch:
         """State (nq,) on the nearest branch: `first` unless another branch is nearer."""
         if len(self.branches) < 2:
             return self._first
-        nearest_branch, first_distance = (
-            self.branches[0],
-            self._requested.distance(self._nearest_to_request),
-        )
+        nearest_branch = self.branches[0]
+        first_distance = self._requested.distance(self._nearest_to_request)
         if nearest_branch.distance < first_distance - _MIN_IMPROVEMENT:
             return self._requested.unwrap_to_requested(nearest_branch.q)
         return self._first
@@ -171,10 +167,8 @@ class BranchSearch:
             self._assembly.closed_state_near(start, self._max_gap) for start in self._start_states()
         )
         closed_states = [closed for closed in starts if closed is not None]
-        requested, states = (
-            self._requested,
-            [self._nearest_to_request if closed_states else self._first],
-        )
+        requested = self._requested
+        states = [self._nearest_to_request if closed_states else self._first]
         for closed in closed_states:
             nearest_state = self._descend_branch(closed)
             if all(

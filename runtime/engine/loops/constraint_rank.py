@@ -1,16 +1,21 @@
-"""Rank of constraint rows: redundant rows of closed loops, and singular configurations.
+"""Rank of constraint rows: redundant rows of closed loops, singular configurations, self-stress.
 
 The rank is determined once, at a state with closed loops, in a metric of the hinges.  In the metric
 of the true masses, a heavy coupler would reduce pivots of independent rows to rounding; in that of
 any body masses, so would parts attached to a loop, such as the rest of a long mast.  The pivot of a
 row that is redundant up to a misfit is proportional to the square of the misfit.  A row that is
 redundant here but not in closed states nearby indicates a singular pose.
+
+Self-stress states are combinations z of multipliers of redundant rows that cause no motion:
+L z = 0.  Repeated solutions with compliant rows, (L + give f) x = give f y from a random y,
+converge to the part of y in this null space, at the cost of one sweep each.  A component of a hinge
+load is unique if no self-stress state contains it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
 from itertools import product
 
 import numpy as np
@@ -25,9 +30,101 @@ from ...packing.loops.system_variants import (
     with_unit_masses,
 )
 from ...packing.scene_packing import packed_system, without_merging
-from ..looped_engine import LoopedEngine
+from ..looped_engine import LoopedEngine, symmetric_matrices
 from .loop_calls import REDUNDANT_PIVOT, LoopCalls
-from .self_stress import IndeterminateLoads, find_indeterminate_loads
+
+#: Components of a load along and about the outboard axes of a hinge.
+_COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
+#: Compliance relative to the mobility, number of repetitions, and number of random states.
+_COMPLIANCE, _REPETITIONS, _RANDOM_STATES = 1e-7, 4, 2
+#: Components that count as rounding: relative to the largest one, and as a multiple of the gaps (m,
+#: rad) of redundant rows, which falsify the states.
+_RELATIVE_ROUNDING, _GAP_FACTOR = 1e-5, 10.0
+
+
+@dataclass(frozen=True)
+class IndeterminateLoads:
+    """Indeterminate loads: components by hinge name, and rows by index."""
+
+    loads: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    rows: frozenset[int] = frozenset()
+
+
+def find_indeterminate_loads(
+    calls: LoopCalls, q: Array, silent: Collection[int] = ()
+) -> IndeterminateLoads:
+    """Find the indeterminate loads at the closed q (nq,), without the rows in `silent`.
+
+    `calls` are those of a geometry in which all rows are satisfied.
+    """
+    gaps = np.abs(calls.correction(calls.position_level, q, np.zeros(calls.engine.nu))[1])
+    rounding = max(_RELATIVE_ROUNDING, _GAP_FACTOR * float(gaps.max(initial=0.0)))
+    random_marks = [
+        _loaded_components(calls, q, silent, seed, rounding) for seed in range(_RANDOM_STATES)
+    ]
+    is_loaded, is_row_loaded = (np.any(marks, axis=0) for marks in zip(*random_marks, strict=True))
+    packed, components_by_hinge = calls.engine.packed, dict[str, tuple[str, ...]]()
+    for number, hinge in enumerate(packed.scene.hinges):
+        marks = is_loaded[packed.topology.position_of_hinge(number)]
+        components = tuple(
+            component for component, mark in zip(_COMPONENTS, marks, strict=True) if mark
+        )
+        if components and number not in packed.layout.internal:
+            components_by_hinge[hinge.name] = components
+    return IndeterminateLoads(
+        components_by_hinge, frozenset(np.flatnonzero(is_row_loaded).tolist())
+    )
+
+
+def outboard_axes(calls: LoopCalls, tree_index: int) -> Array:
+    """Outboard axes (3, 3) of the hinge at a tree index, in internal axes of its body."""
+    packed = calls.engine.packed
+    hinge = packed.scene.hinges[packed.topology.scene_indices(tree_index)[1]]
+    return np.reshape(packed.end(hinge.outboard)[1], (3, 3))
+
+
+def _loaded_components(
+    calls: LoopCalls, q: Array, silent: Collection[int], seed: int, rounding: float
+) -> tuple[Array, Array]:
+    """Masks of components (bodies, 6) and rows (rows,) loaded by a random self-stress state."""
+    for row in range(calls.count):
+        calls.records.set_pivot_floor(row, np.inf if row in silent else 0.0)
+    is_imposed = np.array(
+        [row not in silent and not calls.records.is_rotor_row(row) for row in range(calls.count)]
+    )
+    multipliers = (
+        is_imposed * np.random.default_rng(seed).normal(size=calls.count) / np.sqrt(calls.mobility)
+    )
+    for _ in range(_REPETITIONS):
+        multipliers = is_imposed * calls.solve_multipliers(
+            q, _COMPLIANCE * calls.mobility * multipliers, _COMPLIANCE
+        )
+    return tuple(
+        size > rounding * size.max(initial=0.0)
+        for size in (_load_sizes(calls), np.abs(multipliers) * np.sqrt(calls.mobility))
+    )
+
+
+def _load_sizes(calls: LoopCalls) -> Array:
+    """Magnitudes of the load components (bodies, 6) of inboard hinges, in outboard axes."""
+    packed = calls.engine.packed
+    sizes = np.zeros((packed.system.count, 6))
+    for tree_index in range(len(sizes)):
+        load = _load_at_origin(calls, tree_index)
+        load[3:] += np.cross([0.0, 0.0, packed.system.body(tree_index).height], load[:3])
+        axes = outboard_axes(calls, tree_index)
+        sizes[tree_index] = np.abs(np.concatenate([axes.T @ load[:3], axes.T @ load[3:]]))
+    return sizes
+
+
+def _load_at_origin(calls: LoopCalls, tree_index: int) -> Array:
+    """Load f = S delta + e (6,) of a body from the last call, about its internal origin."""
+    lib, first = calls.engine.lib, int(calls.engine.packed.written.blocks[tree_index])
+    block = calls.engine.workspace_array()[first:]
+    S = symmetric_matrices(block[lib.MSTMM_BLOCK_S : lib.MSTMM_BLOCK_S + 21])
+    delta = block[lib.MSTMM_BLOCK_DELTA : lib.MSTMM_BLOCK_DELTA + 6]
+    return np.asarray(S @ delta + block[lib.MSTMM_BLOCK_E : lib.MSTMM_BLOCK_E + 6])
+
 
 #: Closed states nearby: number, distance (rad, m), and the factor by which the coordinates of cut
 #: hinges, which are dependent, may exceed it.
@@ -87,10 +184,8 @@ def find_rank(engine: LoopedEngine, q: Array) -> Rank:
     locking_gap = LOCKING_GAP_FRACTION * characteristic_length(engine.packed.system)
     is_stuck = is_stuck and not _is_misfit_only(calls, q, redundant_here, locking_gap)
     redundant_there = [_redundant_rows(calls, state, pivot_levels) for state in states]
-    always_redundant, nearby = (
-        redundant_here.intersection(*redundant_there),
-        min(map(len, (redundant_here, *redundant_there))),
-    )
+    always_redundant = redundant_here.intersection(*redundant_there)
+    nearby = min(map(len, (redundant_here, *redundant_there)))
     removed_rows = always_redundant.difference(
         *(_interchangeable_rows(calls, state, always_redundant) for state in (q, *states[:1]))
     )
@@ -296,8 +391,6 @@ def _close(
         largest_gap = float(np.abs(gaps).max(initial=0.0))
         if largest_gap < _CLOSED_GAP and float(np.abs(change).max(initial=0.0)) < settled:
             return near
-        near, compliance = (
-            calls.move(near, change),
-            min(_INITIAL_COMPLIANCE, _COMPLIANCE_PER_GAP * largest_gap),
-        )
+        near = calls.move(near, change)
+        compliance = min(_INITIAL_COMPLIANCE, _COMPLIANCE_PER_GAP * largest_gap)
     return None

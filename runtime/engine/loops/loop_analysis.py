@@ -24,14 +24,12 @@ from ...packing.records.loops import LoopRecords
 from ...packing.scene_packing import packed_system
 from ..looped_engine import LoopedEngine
 from .acceleration_refinement import count_refinements, mass_ratio_text
-from .assembly import Assembly
+from .assembly import Assembly, RotorAssembly
 from .branches import Branch, BranchSearch, RequestedCoordinates
-from .constraint_rank import Rank, find_rank
+from .constraint_rank import Rank, find_rank, outboard_axes
 from .loop_calls import REDUNDANT_PIVOT, LoopCalls
 from .near_parallel_axes import MIN_COUNTING_ANGLE, find_skewed_axis, find_skewed_axis_by_gap
 from .redundant_drives import shared_drives_text
-from .rotor_assembly import RotorAssembly
-from .self_stress import outboard_axes
 
 #: Names of the rows of a hinge that closes a loop, by direction.
 _DIRECTION_NAMES = ("x", "y", "z", "mx", "my", "mz")
@@ -299,16 +297,7 @@ class LoopStart:
         for name, word in (names[row] for row in sorted(rank.open.rows)):
             if name not in packed.layout.hinges:
                 load_names[name] = (*load_names.get(name, ()), word)
-        if rank.is_stuck and not self._has_prescribed_motion:
-            remedy = "give these flexible bodies axial shapes, or let one of their ends slide"
-            if not packed.flexible:
-                remedy = "change a length or the position of a hinge slightly, so that they close "
-                remedy += "in other configurations too"
-            closing = _closing_elements_text(names[row][0] for row in sorted(rank.redundant_here))
-            raise SceneError(
-                f"scene: {closing} in an isolated configuration, stretched out or folded in line; "
-                f"{find_skewed_axis(packed, MIN_COUNTING_ANGLE) or remedy}"
-            )
+        self._check_not_stuck(rank, names)
         imposed_rows = [row for row in range(calls.count) if not records.is_rotor_row(row)]
         independent_count = len(imposed_rows) - len(rank.redundant_here)
         couplings = {
@@ -333,10 +322,7 @@ class LoopStart:
             self.engine = LoopedEngine(packed_system(remaining_system, packed))
             calls = LoopCalls(self.engine, q)
             records = calls.records
-        rounding_rows, redundant_names = (
-            calls.set_pivot_reference(rank.states),
-            {names[row] for row in rank.redundant_here},
-        )
+        rounding_rows = calls.set_pivot_reference(rank.states)
         packed = self.engine.packed
         packed.model.loops_strain = _SINGULAR_STRAIN_RATIO * min(
             map(calls.max_rounding_ratio, rank.states)
@@ -344,6 +330,7 @@ class LoopStart:
         rounding_names = [
             name for row, name in enumerate(self._names(calls)) if row in rounding_rows
         ]
+        redundant_names = {names[row] for row in rank.redundant_here}
         self._check_rounding([name for name in rounding_names if name not in redundant_names])
         analysis = LoopAnalysis(
             tuple(cut.hinge for cut in packed.expanded.cuts if cut.constraint is None),
@@ -353,6 +340,22 @@ class LoopStart:
             mobility, records.width, load_names, flexible_mobility=min(mobility, modal_speed_count),
         )  # fmt: skip
         return analysis, {row: names[row] for row in sorted(rank.always_redundant)}
+
+    def _check_not_stuck(self, rank: Rank, names: Sequence[tuple[str, str]]) -> None:
+        """Raise SceneError if the loops close in an isolated configuration only."""
+        if not rank.is_stuck or self._has_prescribed_motion:
+            return
+        remedy = (
+            "give these flexible bodies axial shapes, or let one of their ends slide"
+            if self.engine.packed.flexible
+            else "change a length or the position of a hinge slightly, so that they close in other "
+            "configurations too"
+        )
+        closing = _closing_elements_text(names[row][0] for row in sorted(rank.redundant_here))
+        raise SceneError(
+            f"scene: {closing} in an isolated configuration, stretched out or folded in line; "
+            f"{find_skewed_axis(self.engine.packed, MIN_COUNTING_ANGLE) or remedy}"
+        )
 
     def _excess_hold_text(self, q: Array, holds: Sequence[str], free_speeds: int) -> str:
         """Message part if `holds` fix more coordinates than the mobility near q, else ""."""

@@ -1,17 +1,20 @@
-"""Calls of the looped engine for closed loops."""
+"""Calls of the looped engine for closed loops, and the mobility of constraint rows."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mstmm.array_validation import Array
+from mstmm.ir.scene_structure import Key
 
+from ...packing.records.couplings import WrittenCoupling
+from ...packing.records.loops import WrittenClosure
+from ...packing.system import Numbers
 from ..looped_engine import LoopedEngine
-from .constraint_mobility import row_mobilities
-from .loop_workspace import LoopWorkspace
 
 #: Fraction of its reference below which a pivot is rounding.  The reference is the mobility of the
 #: row, except for rows with pivots below the second fraction of it because of heavy bodies.
@@ -22,7 +25,7 @@ REDUNDANT_PIVOT = 1e-6
 _MIN_REFERENCE, _MIN_PIVOT = 1e-12, 1e-15
 
 
-class LoopCalls(LoopWorkspace):
+class LoopCalls:
     """Position gaps and velocity errors of the loops of one packed scene, and their corrections.
 
     The reference for the pivot of every row is the mobility of its ends at `q` (nq,) as free
@@ -33,9 +36,10 @@ class LoopCalls(LoopWorkspace):
     def __init__(
         self, engine: LoopedEngine, q: Array, mobility: Array | None = None, t: float = 0.0
     ) -> None:
-        super().__init__(engine)
-        self.t = t
-        records, self.model = self.records, engine.packed.model
+        records = engine.packed.written.loops
+        assert records is not None
+        self.engine, self.records, self.model = engine, records, engine.packed.model
+        self.count, self.t = records.count, t
         self.memory = engine.start_memory()
         quaternions = np.append(engine.packed.layout.quaternions, 0).astype(np.int32)
         self._quaternions = quaternions
@@ -58,15 +62,10 @@ class LoopCalls(LoopWorkspace):
         self, level: int, q: Array, u: Array, give: float = 0.0, t: float | None = None
     ) -> tuple[Array, Array]:
         """Correction along the speeds (nu,) and row errors (rows,); see sweep.h."""
-        engine, t = self.engine, self.t if t is None else t
-        change, errors = np.zeros(engine.nu), np.zeros(max(1, self.count))
-        failure = engine.ffi.new("mstmm_failure *")
-        code = engine.lib.mstmm_correction(
-            self.model, engine.workspace(), level, give, t, engine.pointer(q), engine.pointer(u),
-            engine.pointer(self.memory), engine.pointer(change), engine.pointer(errors), failure,
-        )  # fmt: skip
-        if code:
-            raise engine.evaluation_error(failure, t, q, u)
+        t = self.t if t is None else t
+        change, errors = np.zeros(self.engine.nu), np.zeros(max(1, self.count))
+        arrays = q, u, self.memory, change, errors
+        self.engine.call("correction", (t, q, u), level, give, t, *arrays)
         return change, errors[: self.count]
 
     def choose(self, q: Array) -> bool:
@@ -74,14 +73,9 @@ class LoopCalls(LoopWorkspace):
 
         The previous choice is kept unless it is much worse than the best one at q (nq,).
         """
-        engine = self.engine
-        is_changed, failure = engine.ffi.new("int *"), engine.ffi.new("mstmm_failure *")
-        code = engine.lib.mstmm_choose_rows(
-            self.model, engine.workspace(), self.t, engine.pointer(q), engine.pointer(self.memory),
-            is_changed, failure,
-        )  # fmt: skip
-        if code:
-            raise engine.evaluation_error(failure, self.t, q, np.zeros(engine.nu))
+        is_changed = self.engine.ffi.new("int *")
+        state = self.t, q, np.zeros(self.engine.nu)
+        self.engine.call("choose_rows", state, self.t, q, self.memory, is_changed)
         return bool(is_changed[0])
 
     def inactive_rows(self) -> NDArray[np.bool_]:
@@ -99,39 +93,22 @@ class LoopCalls(LoopWorkspace):
 
     def solve_multipliers(self, q: Array, errors: Array, give: float) -> Array:
         """Multipliers (rows,) of rows with errors `errors` and compliance `give`; see sweep.h."""
-        engine, multipliers = self.engine, np.zeros(max(1, self.count))
-        failure = engine.ffi.new("mstmm_failure *")
-        code = engine.lib.mstmm_self_stress(
-            self.model, engine.workspace(), give, engine.pointer(errors), engine.pointer(q),
-            engine.pointer(self.memory), engine.pointer(multipliers), failure,
-        )  # fmt: skip
-        if code:
-            raise engine.evaluation_error(failure, 0.0, q, np.zeros(engine.nu))
+        multipliers, state = np.zeros(max(1, self.count)), (0.0, q, np.zeros(self.engine.nu))
+        self.engine.call("self_stress", state, give, errors, q, self.memory, multipliers)
         return multipliers[: self.count]
 
     def move(self, q: Array, change: Array) -> Array:
         """Move q (nq,) by a change along the speeds (nu,)."""
-        engine, q_moved, t = self.engine, q.copy(), self.t
-        failure = engine.ffi.new("mstmm_failure *")
-        code = engine.lib.mstmm_move_positions(
-            self.model, engine.workspace(), t, engine.pointer(q_moved), engine.pointer(change),
-            engine.pointer(self.memory), len(self._quaternions) - 1,
-            engine.ffi.from_buffer("int[]", self._quaternions), failure,
-        )  # fmt: skip
-        if code:
-            raise engine.evaluation_error(failure, t, q, change)
+        q_moved, quaternions = q.copy(), self._quaternions
+        indices = len(quaternions) - 1, self.engine.ffi.from_buffer("int[]", quaternions)
+        arrays = q_moved, change, self.memory
+        self.engine.call("move_positions", (self.t, q, change), self.t, *arrays, *indices)
         return q_moved
 
     def driven_state(self, q: Array, u: Array) -> tuple[Array, Array]:
         """State (q, u) with driven coordinates and speeds set to their prescribed values."""
-        engine, q, u, t = self.engine, q.copy(), u.copy(), self.t
-        failure = engine.ffi.new("mstmm_failure *")
-        code = engine.lib.mstmm_fill_driven(
-            self.model, engine.workspace(), t, engine.pointer(q), engine.pointer(u),
-            engine.pointer(self.memory), failure,
-        )  # fmt: skip
-        if code:
-            raise engine.evaluation_error(failure, t, q, u)
+        q, u = q.copy(), u.copy()
+        self.engine.call("fill_driven", (self.t, q, u), self.t, q, u, self.memory)
         return q, u
 
     def set_pivot_reference(self, states: Sequence[Array]) -> set[int]:
@@ -164,3 +141,132 @@ class LoopCalls(LoopWorkspace):
         """Largest ratio of rounding level to pivot over all rows, at a closed state."""
         self.correction(self.velocity_level, q, np.zeros(self.engine.nu))
         return float((self.inverses() * self.records.floors).max(initial=0.0))
+
+    # --- workspace of the last correction -------------------------------------------------------
+
+    def closing_label(self, row: int) -> str:
+        """Label of the element to which a row belongs, for messages."""
+        for closure in self.records.closures:
+            if row in closure.rows.values():
+                return self.engine.closing_label(closure.frame)
+        return f'coupling "{self.coupling_name(row)}"'
+
+    def coupling_name(self, row: int) -> str:
+        """Name of the coupling to which a row belongs, or ""."""
+        names = (
+            coupling.coupling.name for coupling in self.records.couplings if coupling.row == row
+        )
+        return next(names, "")
+
+    def inverses(self) -> Array:
+        """Inverse pivots of the rows in the last correction, 0 for rows without a multiplier."""
+        return self._row_values("INVERSE")
+
+    def pivots(self) -> Array:
+        """Pivots of the rows in the last correction."""
+        return self._row_values("PIVOT")
+
+    def _row_values(self, name: str) -> Array:
+        lib, stride = self.engine.lib, int(self.engine.lib.MSTMM_ROW)
+        first = self.records.offset + int(getattr(lib, f"MSTMM_ROW_{name}"))
+        return self.engine.workspace_array()[first : first + stride * self.count : stride].copy()
+
+    def values(self) -> Array:
+        """Values of the couplings in the last gap correction."""
+        first = self.records.offset + int(self.engine.lib.MSTMM_COUPLING_GAP)
+        indices = [first + coupling.numbers for coupling in self.records.couplings]
+        return self.engine.workspace_array()[indices]
+
+    def coupling_derivatives(self, coupling: WrittenCoupling, tree_index: int) -> Array:
+        """Derivatives -C (nu,) of a coupling with respect to the speeds of one of its hinges.
+
+        Valid after a correction.
+        """
+        start = self.records.offset + coupling.columns[tree_index]
+        return self.engine.workspace_array()[
+            start : start + self.engine.packed.system.body(tree_index).nu
+        ]
+
+    def closure_matrix(self, closure: WrittenClosure, name: str) -> Array:
+        """Matrix (6, 6) of a closure after a correction: W, J_A or J_B."""
+        start = self.records.offset + closure.numbers
+        start += int(getattr(self.engine.lib, f"MSTMM_CLOSURE_{name}"))
+        return self.engine.workspace_array()[start : start + 36].reshape(6, 6).copy()
+
+
+def row_mobilities(numbers: LoopCalls) -> Array:
+    """Mobility J M^-1 J^T (rows,) of both ends of every row, after a correction.
+
+    Rows between massless bodies get the mean of the others.
+    """
+    mobility, body_masses = np.zeros(numbers.count), _BodyMasses(numbers.engine)
+    for closure in numbers.records.closures:
+        for body, name in ((closure.inboard, "J_A"), (closure.outboard, "J_B")):
+            if body >= 0:
+                columns, inverse = numbers.closure_matrix(closure, name), body_masses.inverse(body)
+                for direction, row in closure.rows.items():
+                    column = columns[direction]
+                    mobility[row] += column @ inverse @ column
+    for coupling in numbers.records.couplings:
+        mobility[coupling.row] = _coupling_mobility(numbers, coupling, body_masses)
+    known_mobilities = mobility[mobility > 0]
+    mobility[~(mobility > 0)] = known_mobilities.mean() if len(known_mobilities) else 1.0
+    return mobility
+
+
+def _coupling_mobility(numbers: LoopCalls, coupling: WrittenCoupling, masses: _BodyMasses) -> float:
+    """Mobility C^T D^-1 C of a coupling, summed over its hinges.
+
+    D is that of the single body of the hinge; a closing hinge counts like its rows.
+    """
+    mobility, closures = 0.0, {closure.frame: closure for closure in numbers.records.closures}
+    for tree_index in coupling.columns:
+        derivatives = numbers.coupling_derivatives(coupling, tree_index)
+        if tree_index not in closures:
+            mobility += _hinge_mobility(numbers.engine, tree_index, derivatives, masses)
+            continue
+        closure = closures[tree_index]
+        for body, name in ((closure.inboard, "J_A"), (closure.outboard, "J_B")):
+            if body >= 0:
+                column = derivatives @ numbers.closure_matrix(closure, name)[: len(derivatives)]
+                mobility += float(column @ masses.inverse(body) @ column)
+    return mobility
+
+
+def _hinge_mobility(
+    engine: LoopedEngine, tree_index: int, slopes: Array, masses: _BodyMasses
+) -> float:
+    body, lib = engine.packed.system.body(tree_index), engine.lib
+    free_speeds = [k for k in range(body.nu) if not body.imposed[k]]
+    start = int(engine.packed.written.blocks[tree_index]) + int(lib.MSTMM_BLOCK_FIXED)
+    start += int(lib.MSTMM_SPEED_H_FREE) * body.nu
+    motion_subspace = engine.workspace_array()[start : start + 6 * len(free_speeds)].reshape(
+        6, len(free_speeds)
+    )
+    inertia = motion_subspace.T @ masses.matrix(tree_index) @ motion_subspace + np.diag(
+        np.array(body.rotor)[free_speeds]
+    )
+    return float(slopes[free_speeds] @ _pseudo_inverse(inertia) @ slopes[free_speeds])
+
+
+def _pseudo_inverse(matrix: Array) -> Array:
+    """Pseudo-inverse, in which directions without inertia do not move."""
+    return np.asarray(np.linalg.pinv(matrix, rcond=1e-12, hermitian=True), dtype=np.float64)
+
+
+class _BodyMasses:
+    """Mass matrices of single bodies about input ends and their inverses, cached by body data."""
+
+    def __init__(self, engine: LoopedEngine) -> None:
+        self._system, self._matrix = engine.packed.system, cache(engine.inertia_matrix)
+        self._inverse = cache(lambda *kind: _pseudo_inverse(self._matrix(*kind)))
+
+    def matrix(self, body: int) -> Array:
+        return self._matrix(*self._kind(body))
+
+    def inverse(self, body: int) -> Array:
+        return self._inverse(*self._kind(body))
+
+    def _kind(self, body: int) -> tuple[Key, Numbers]:
+        record = self._system.body(body)
+        return record.body, record.body_p

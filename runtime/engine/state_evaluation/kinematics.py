@@ -19,12 +19,10 @@ from mstmm.errors import NumericalFailure
 
 from ...kernels.fused_library import FusedLibrary
 from ...kernels.prepared_calls import PreparedCall, prepare_call, unavailable_call
-from ..body_references import BodyReferences
-from ..engine_calls import Probe
 from ..fused_code import FusedCode
-from ..looped_engine import LoopedEngine
-from ..observation_columns import POINT_COLUMNS
-from .single_state import is_small
+from ..looped_engine import LoopedEngine, Probe
+from ..quantity_registry import POINT_COLUMNS, BodyReferences
+from .state_calls import is_small
 
 #: Columns of a probe: velocity and angular velocity; acceleration and angular acceleration.
 _VELOCITY_COLUMNS = [*range(3, 6), *range(9, 12)]

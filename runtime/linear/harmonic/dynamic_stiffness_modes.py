@@ -22,7 +22,7 @@ from mstmm.array_validation import Array, Integers, integer
 from mstmm.errors import NumericalFailure, SceneError
 from mstmm.risk import AssessedResult, DeferredRisks, Risk
 
-from ...engine.harmonic_response import HarmonicResponse
+from ...engine.tangent_matrix import HarmonicResponse
 from ..modes import CHANNEL_RISKS
 from .exact_beams import BeamSelection, ExactBeams, exact_beams
 

@@ -21,8 +21,7 @@ from mstmm.scene import split_reference
 from mstmm.scene.tables.beam import DIRECTIONS
 from mstmm.scene.validators.validation_messages import did_you_mean
 
-from ...engine.harmonic_response import Complex, DynamicStiffnessBodies
-from ...engine.tangent_matrix import TangentMatrix
+from ...engine.tangent_matrix import Complex, DynamicStiffnessBodies, TangentMatrix
 from ...flexible.beam.beam_data import BeamData, beam_data
 from ...flexible.beam.boundary_conditions import BeamEnvironment, boundary_conditions
 from ...flexible.beam.dynamic_stiffness import BENDING, HarmonicBeam, harmonic_beam

@@ -26,7 +26,7 @@ from mstmm.display import abbreviate_names
 from mstmm.errors import NumericalFailure, SceneError
 from mstmm.risk import RUN, DeferredRisks, Risk
 
-from ...engine.characteristic_scales import speed_scales
+from ...engine.compiled_scene import speed_scales
 from ...risk_checks.state_risks import find_state_risks
 from ...run.scene_system import SceneSystem
 from .. import energy_shares

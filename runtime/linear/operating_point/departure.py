@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure
 
-from ...engine.characteristic_scales import scene_length, speed_scales, total_weight
+from ...engine.compiled_scene import scene_length, speed_scales, total_weight
 from .later_states import LaterStates
 
 if TYPE_CHECKING:

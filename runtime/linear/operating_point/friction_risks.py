@@ -13,7 +13,7 @@ from scipy.linalg import lstsq
 from mstmm.array_validation import Array
 from mstmm.risk import Risk
 
-from ...engine.characteristic_scales import speed_scales
+from ...engine.compiled_scene import speed_scales
 from .friction import StickingFriction
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from mstmm.display import abbreviate_names
 from mstmm.errors import NumericalFailure
 from mstmm.risk import Risk, information
 
-from ...engine.characteristic_scales import speed_scales
+from ...engine.compiled_scene import speed_scales
 from ...run.start_state import initial_state
 
 if TYPE_CHECKING:

@@ -14,8 +14,8 @@ from mstmm.display import abbreviate_names
 from mstmm.errors import NumericalFailure, SceneError
 
 from ...discontinuities.active_expressions import active_expressions
-from ...engine.characteristic_scales import speed_scales
-from ...engine.state_evaluation.steady_motion import move_steadily
+from ...engine.compiled_scene import speed_scales
+from ...engine.state_evaluation.state_calls import move_steadily
 from ...run.scene_system import SceneSystem
 from ..mck_matrices import State
 

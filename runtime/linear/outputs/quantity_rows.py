@@ -19,11 +19,11 @@ from mstmm.expression.expression import Name
 from mstmm.scene.tables.law import SpringLaw
 from mstmm.scene.validators.validation_messages import did_you_mean
 
-from ...engine.body_references import BodyReferences
-from ...engine.engine_calls import Probe
-from ...engine.observation_columns import (
+from ...engine.looped_engine import Probe
+from ...engine.quantity_registry import (
     BODY_QUANTITIES,
     POINT_COLUMNS,
+    BodyReferences,
     acceleration_name,
     rate_unit,
 )

@@ -15,7 +15,7 @@ import numpy as np
 from mstmm.array_validation import Array
 from mstmm.scene import split_reference
 
-from ...engine.engine_calls import Probe
+from ...engine.looped_engine import Probe
 from ...result.flexible import motion as observe
 
 if TYPE_CHECKING:

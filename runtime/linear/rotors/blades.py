@@ -24,8 +24,8 @@ import numpy as np
 
 from mstmm.array_validation import Array, Integers
 
-from ...engine.engine_calls import Probe
-from ...engine.observation_columns import POINT_COLUMNS
+from ...engine.looped_engine import Probe
+from ...engine.quantity_registry import POINT_COLUMNS
 
 if TYPE_CHECKING:
     from ...packing.packed_scene import PackedScene

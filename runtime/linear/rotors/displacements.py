@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from mstmm.array_validation import Array
 
-from ...engine.characteristic_scales import scene_length
-from ...engine.engine_calls import Probe
-from ...engine.observation_columns import POINT_COLUMNS, SUMS
+from ...engine.compiled_scene import scene_length
+from ...engine.looped_engine import Probe
+from ...engine.quantity_registry import POINT_COLUMNS, SUMS
 from ..mck_matrices import State
 from .blades import find_blades
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from mstmm.array_validation import Array
 
-from ...engine.state_evaluation.steady_motion import move_steadily
+from ...engine.state_evaluation.state_calls import move_steadily
 from ...run.scene_system import SceneSystem
 from ..mck_matrices import State
 from ..operating_point.later_states import equations_at

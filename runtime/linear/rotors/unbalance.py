@@ -15,7 +15,7 @@ from mstmm.array_validation import Array, finite_float
 from mstmm.errors import SceneError
 from mstmm.risk import AssessedResult, DeferredRisks, Risk
 
-from ...engine.body_references import BodyReferences
+from ...engine.quantity_registry import BodyReferences
 from ...risk_checks.state_risks import merge_over_values
 from .. import file_formats
 from .displacements import angular_velocity

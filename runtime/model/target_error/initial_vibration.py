@@ -16,7 +16,7 @@ import numpy as np
 from mstmm.array_validation import Array, Integers
 from mstmm.errors import NumericalFailure
 
-from ...engine.eigenvalues import eigenvalues
+from ...engine.jacobian import eigenvalues
 from ...packing.qr_sweep import reject_qr_steps
 from ...run.spectral_radius import fastest_at_start
 

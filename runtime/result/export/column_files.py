@@ -16,7 +16,7 @@ from mstmm.array_validation import Array, Integers
 from mstmm.errors import SceneError
 from mstmm.scene.validators.validation_messages import did_you_mean
 
-from ...engine.observation_columns import BODY_QUANTITIES, HINGE_QUANTITIES, WXYZ, XYZ
+from ...engine.quantity_registry import BODY_QUANTITIES, HINGE_QUANTITIES, WXYZ, XYZ
 from ..plotting.default_quantities import rate_candidates
 from ..plotting.plot_sources import Candidate
 from ..quantity_names import Quantity

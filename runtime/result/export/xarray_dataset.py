@@ -9,7 +9,7 @@ import numpy as np
 from mstmm.ir.hinge_properties import effort_unit
 from mstmm.optional_packages import missing_package_error
 
-from ...engine.observation_columns import (
+from ...engine.quantity_registry import (
     BODY_QUANTITIES,
     HINGE_QUANTITIES,
     SUMS,

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from mstmm.scene import split_reference
 
-from ...engine.observation_columns import QuantityKind
+from ...engine.quantity_registry import QuantityKind
 
 if TYPE_CHECKING:
     from ..quantity_names import Table

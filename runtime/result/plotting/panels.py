@@ -11,7 +11,7 @@ from mstmm.argument_validation import require_word
 from mstmm.array_validation import Array
 from mstmm.errors import SceneError
 
-from ...engine.observation_columns import rate_unit
+from ...engine.quantity_registry import rate_unit
 from ..quantity_names import Quantity, column_labels
 from .curve_interpolation import curve
 from .default_quantities import DefaultPanel, choose_panels

@@ -12,7 +12,7 @@ from mstmm.array_validation import Array
 from mstmm.expression.derivatives import INPUTS
 from mstmm.numerics.piecewise_polynomial import NUMBERS_PER_PIECE
 
-from ...engine.engine_calls import Probe
+from ...engine.looped_engine import Probe
 from ...kernels import numpy_kernels
 from ...packing.system import System
 

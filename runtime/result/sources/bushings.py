@@ -13,8 +13,8 @@ from mstmm.ir import KernelIR
 from mstmm.ir.element_spec import kernel_from_json
 from mstmm.scene.tables.bushing import upper_triangle
 
-from ...engine.engine_calls import Probe
-from ...engine.observation_columns import POINT_COLUMNS, XYZ, QuantityKind
+from ...engine.looped_engine import Probe
+from ...engine.quantity_registry import POINT_COLUMNS, XYZ, QuantityKind
 from ...kernels import numpy_kernels
 from ..quantity_names import Table
 

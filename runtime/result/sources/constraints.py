@@ -10,7 +10,7 @@ from mstmm.array_validation import Array
 from mstmm.scene.tables.closures import CURVE, DISTANCE, ROLLING
 from mstmm.scene.validators.scalars_and_vectors import GROUND
 
-from ...engine.observation_columns import XYZ, QuantityKind
+from ...engine.quantity_registry import XYZ, QuantityKind
 from ...packing.coordinate_layout import OF_CONSTRAINT
 from ..quantity_names import Table
 

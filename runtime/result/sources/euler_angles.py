@@ -9,7 +9,7 @@ import numpy as np
 
 from mstmm.array_validation import Array
 
-from ...engine.observation_columns import QuantityKind
+from ...engine.quantity_registry import QuantityKind
 
 #: Yaw and roll are continuous, pitch is within +-pi/2.
 EULER_KIND = QuantityKind(

@@ -14,12 +14,7 @@ import numpy as np
 from mstmm.array_validation import Array
 from mstmm.ir.hinge_properties import effort_unit
 
-from ...engine.observation_columns import (
-    HINGE_QUANTITIES,
-    acceleration_name,
-    effort_names,
-    rate_unit,
-)
+from ...engine.quantity_registry import HINGE_QUANTITIES, acceleration_name, effort_names, rate_unit
 from ...packing.coordinate_layout import HingeSlots
 from ...packing.system import System
 from ..quantity_names import Table, Values

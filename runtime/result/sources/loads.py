@@ -8,7 +8,7 @@ import numpy as np
 
 from mstmm.array_validation import Array
 
-from ...engine.observation_columns import POINT_COLUMNS, XYZ, QuantityKind
+from ...engine.quantity_registry import POINT_COLUMNS, XYZ, QuantityKind
 from ..quantity_names import Table
 from .applied_loads import AppliedLoads
 

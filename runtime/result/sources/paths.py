@@ -14,7 +14,7 @@ from mstmm.expression.expression import Name
 from ...discontinuities.active_expressions import ActiveExpression
 from ...discontinuities.interval_arithmetic import Interval
 from ...discontinuities.interval_enclosures import TIME, Enclosure
-from ...engine.engine_calls import Probe
+from ...engine.looped_engine import Probe
 
 if TYPE_CHECKING:
     from mstmm.scene import Hinge

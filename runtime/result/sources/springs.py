@@ -10,7 +10,7 @@ import numpy as np
 from mstmm.array_validation import Array
 from mstmm.errors import SceneError
 
-from ...engine.observation_columns import XYZ, QuantityKind
+from ...engine.quantity_registry import XYZ, QuantityKind
 from ...kernels import numpy_kernels
 from ..quantity_names import Table, Values
 from .applied_loads import AppliedLoads

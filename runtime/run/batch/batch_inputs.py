@@ -15,8 +15,7 @@ from mstmm.numerics.piecewise_polynomial import PiecewisePolynomial, constant, i
 
 from ...discontinuities.active_expressions import active_expressions
 from ...discontinuities.expression_functions import ExpressionFunctions
-from ...engine.input_update import with_input_pieces
-from ...engine.input_values import InputValue
+from ...engine.inputs import InputValue, with_input_pieces
 
 if TYPE_CHECKING:
     from ...engine.compiled_scene import CompiledScene

@@ -13,7 +13,7 @@ from mstmm.array_validation import Array
 from mstmm.errors import SceneError
 from mstmm.numerics.piecewise_polynomial import PiecewisePolynomial
 
-from ...engine.live_inputs import IndexPairs, LiveInputs
+from ...engine.inputs import IndexPairs, LiveInputs
 from ...engine.looped_engine import LoopedEngine
 from ...integrate.c_loop import Status
 from ...integrate.c_tableau import c_tableau

@@ -10,7 +10,7 @@ import numpy as np
 from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure, SceneError
 
-from ...engine.characteristic_scales import speed_scales
+from ...engine.compiled_scene import speed_scales
 from ...engine.loops.independent_speeds import IndependentSpeeds
 from ..scene_system import SceneSystem
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure
 
-from ...engine.statics.static_equilibrium import (
+from ...engine.static_equilibrium import (
     EquilibriumNotFoundError,
     EquilibriumProblem,
     UndeterminedEquilibriumError,

@@ -9,8 +9,7 @@ import pytest
 
 import mstmm
 from mstmm.errors import NumericalFailure, SceneError
-from mstmm.runtime.engine.harmonic_response import HarmonicResponse
-from mstmm.runtime.engine.tangent_matrix import TangentMatrix
+from mstmm.runtime.engine.tangent_matrix import HarmonicResponse, TangentMatrix
 from mstmm.runtime.linear.linear_model import Linear
 from tests.reference import random_scenes
 from tests.reference.jets import Array

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import mstmm
-from mstmm.runtime.engine.eigenvalues import fastest_eigenvalue
+from mstmm.runtime.engine.jacobian import fastest_eigenvalue
 from mstmm.runtime.result.certificate import Certificate
 from mstmm.runtime.result.result import Result
 from tests.support.models import model_of
@@ -262,12 +262,12 @@ def test_the_fastest_motion_of_a_pin_with_a_law(
 
 
 def test_the_fastest_motion_of_a_long_chain_is_found_without_a_dense_matrix() -> None:
-    from mstmm.runtime.engine import eigenvalues
+    from mstmm.runtime.engine import jacobian
 
     engine = mstmm.compile(pins(90, [0.05, -0.1] * 45, stiffness=1e4)).looped
     y = np.concatenate([np.tile([0.05, -0.1], 45), np.zeros(90)])
     dense = np.linalg.eigvals(
-        eigenvalues._central_differences(engine, 0.0, y, engine.start_memory(), 1e-6 * np.eye(180))
+        jacobian._central_differences(engine, 0.0, y, engine.start_memory(), 1e-6 * np.eye(180))
         / 1e-6
     )
     value, _ = fastest_eigenvalue(engine, 0.0, y, engine.start_memory())

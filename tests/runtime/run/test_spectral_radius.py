@@ -9,7 +9,7 @@ import pytest
 
 import mstmm
 from benchmarks.stiff.cases import CASES
-from mstmm.runtime.engine.eigenvalues import fastest_eigenvalue
+from mstmm.runtime.engine.jacobian import fastest_eigenvalue
 from mstmm.runtime.run.spectral_radius import FastestMode, fastest_at_start
 from tests.reference import random_scenes
 from tests.reference.jets import Array

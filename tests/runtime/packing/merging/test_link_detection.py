@@ -12,8 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 import mstmm
-from mstmm.runtime.engine.engine_calls import Observation
-from mstmm.runtime.engine.looped_engine import LoopedEngine
+from mstmm.runtime.engine.looped_engine import LoopedEngine, Observation
 from mstmm.runtime.packing.packed_scene import PackedScene
 from mstmm.runtime.packing.records.body_records import link_kernel
 from mstmm.runtime.packing.scene_packing import pack

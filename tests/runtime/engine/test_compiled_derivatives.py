@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import ArrayLike
 
 import mstmm
-from mstmm.runtime.engine import compiled_linearisation
+from mstmm.runtime.engine import compiled_derivatives
 from tests.reference.compare import seeded_scene, worst
 from tests.support.scenes.linear import hanging_beam, pendulum
 
@@ -109,7 +109,7 @@ def test_code_is_compiled_once_so_many_states_pay(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("MSTMM_CACHE", str(tmp_path))
-    monkeypatch.setattr(compiled_linearisation, "_SECONDS_PER_PAIR", 1e-4)
+    monkeypatch.setattr(compiled_derivatives, "_SECONDS_PER_PAIR", 1e-4)
     model = mstmm.compile(pendulum())
     by_sweep = 0
     while model.linearize([0.2]).compiled_state is None:

@@ -1,4 +1,4 @@
-"""Static equilibrium by Newton's method and load steps.
+"""Static equilibrium by Newton's method and load steps, and loads without equilibrium.
 
 Efforts of different kinds (N and N*m, of an axial shape and of a twist) are never compared: every
 stiffness is scaled by those of its own coordinate, and every step by the characteristic scale of
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mstmm.array_validation import Array
-from mstmm.errors import NumericalFailure
+from mstmm.errors import NumericalFailure, SceneError
 
 _MAX_STEP = 0.5  # in characteristic scales of the coordinates
 #: Scaled stiffness below which a direction counts as slack: for central differences, and for those
@@ -337,3 +337,58 @@ def unstable_coordinates(problem: EquilibriumProblem, q: Array) -> tuple[int, ..
             "steps become too short far from equilibrium", residual / problem.sizes, problem
         )
     return () if _is_asymmetric(stiffness, scale) else moving_indices(values < 0)
+
+
+#: Maximum number of coordinates, number of random states in addition to that of coordinates, and
+#: number of attempts per state.
+_MAX_COORDINATES, _SPARE, _DRAWS = 200, 12, 2
+#: Distances of the states, in characteristic scales: far enough to reach stops and the stiffness of
+#: soft springs.
+_NEAREST, FARTHEST = 0.1, 1e4
+#: Variation that counts as rounding: of efforts, relative to the largest ones, and of the load.
+_ROUNDING, _CONSTANT = 1e-9, 1e-6
+#: Smallest scale of the efforts of a coordinate, relative to the largest scale.
+_MIN_EFFORT_SCALE = 1e-5
+
+
+def find_unbalanced_motion(
+    problem: EquilibriumProblem, q: Array, farthest: float = FARTHEST
+) -> tuple[Array, int] | None:
+    """Motion (n,) with a constant non-zero load along it, and the number of states examined.
+
+    Random states are drawn around q, at distances from 0.1 to `farthest` characteristic scales.
+    None if every load varies, or if too few of the states are valid.
+    """
+    count = len(problem.sizes)
+    if not 0 < count <= _MAX_COORDINATES:
+        return None
+    efforts = _random_efforts(problem, q, count + _SPARE, farthest)
+    if len(efforts) < count + _SPARE:
+        return None
+    scale = np.abs(efforts).max(axis=0)
+    if not scale.any():
+        return None
+    scale = np.maximum(scale, _MIN_EFFORT_SCALE * scale.max())
+    rows = efforts / scale
+    _, values, directions = np.linalg.svd(rows[1:] - rows[0])
+    still = directions[values <= _ROUNDING * len(rows)]
+    motion = still.T @ (still @ rows[0])
+    loads = rows @ motion
+    if np.linalg.norm(motion) <= _ROUNDING or np.ptp(loads) > _CONSTANT * abs(loads[0]):
+        return None
+    return motion / scale * problem.sizes, len(efforts)
+
+
+def _random_efforts(problem: EquilibriumProblem, q: Array, count: int, farthest: float) -> Array:
+    """Efforts (k, n), J, at q and at random states around it, with k at most `count`."""
+    draw, effort_samples = np.random.default_rng(0), [problem.efforts(q)]
+    for _ in range(_DRAWS * count):
+        if len(effort_samples) == count:
+            break
+        distance = np.exp(draw.uniform(np.log(_NEAREST), np.log(farthest)))
+        step = distance * draw.uniform(-1.0, 1.0, len(problem.sizes))
+        try:
+            effort_samples.append(problem.efforts(problem.advance_state(q, step)))
+        except (NumericalFailure, SceneError):
+            continue
+    return np.array(effort_samples)

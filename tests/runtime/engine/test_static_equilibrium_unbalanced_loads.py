@@ -9,8 +9,7 @@ import pytest
 
 import mstmm
 from mstmm.errors import NumericalFailure
-from mstmm.runtime.engine.statics.static_equilibrium import EquilibriumProblem
-from mstmm.runtime.engine.statics.unbalanced_loads import find_unbalanced_motion
+from mstmm.runtime.engine.static_equilibrium import EquilibriumProblem, find_unbalanced_motion
 from tests.support.paths import EXAMPLES
 
 

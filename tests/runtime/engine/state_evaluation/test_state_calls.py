@@ -11,7 +11,7 @@ import pytest
 
 import mstmm
 from mstmm import NumericalFailure, SceneError
-from mstmm.runtime.engine.state_evaluation.single_state import MAX_SIZE, SingleStateCalls
+from mstmm.runtime.engine.state_evaluation.state_calls import MAX_SIZE, SingleStateCalls
 from mstmm.runtime.kernels.prepared_calls import prepare_call
 
 ROD: dict[str, Any] = {

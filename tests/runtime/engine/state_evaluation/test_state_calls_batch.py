@@ -9,7 +9,7 @@ import pytest
 
 import mstmm
 from mstmm.errors import NumericalFailure, SceneError
-from mstmm.runtime.engine.state_evaluation import state_batch
+from mstmm.runtime.engine.state_evaluation import state_calls
 from tests.support.scenes.rods import chain, drawn_state
 
 ENGINES = ("fused", "looped")
@@ -31,8 +31,8 @@ def states(n: int) -> tuple[Any, Any]:
 @pytest.fixture
 def small_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
     """Threads from a handful of states on."""
-    monkeypatch.setattr(state_batch, "_MIN_WORK_LANES", 16)
-    monkeypatch.setattr(state_batch, "_MIN_WORK_LOOPED", 8)
+    monkeypatch.setattr(state_calls, "_MIN_WORK_LANES", 16)
+    monkeypatch.setattr(state_calls, "_MIN_WORK_LOOPED", 8)
 
 
 @pytest.mark.parametrize("engine", ENGINES)

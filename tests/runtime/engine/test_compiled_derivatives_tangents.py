@@ -11,7 +11,7 @@ import pytest
 import mstmm
 from mstmm.abi.derivative_library import SYMBOL
 from mstmm.errors import EnvironmentFailure
-from mstmm.runtime.engine import tangent_kernels
+from mstmm.runtime.engine import compiled_derivatives
 from mstmm.runtime.kernels.derivative_library import open_derivative_library
 from tests.reference.compare import seeded_scene, worst
 
@@ -39,7 +39,7 @@ def test_compiled_and_interpreted_agree(cache: Path, monkeypatch: pytest.MonkeyP
     tape = mstmm.compile(scene)
     wanted = tape.derivatives(*batch, TIME, parameters=names)
     assert not in_use(tape, names)
-    monkeypatch.setattr(tangent_kernels, "WORTH_COMPILING", 0)
+    monkeypatch.setattr(compiled_derivatives, "WORTH_COMPILING", 0)
     model = mstmm.compile(scene)
     found = model.derivatives(*batch, TIME, parameters=names)
     assert in_use(model, names)
@@ -63,14 +63,14 @@ def test_the_compiler_is_started_when_directions_add_up(
     data, q, u = seeded_scene(11, types=("pin",), most=1)
     model = mstmm.compile(mstmm.Scene(**data))
     per_state = 4 * model.nu + 1
-    monkeypatch.setattr(tangent_kernels, "WORTH_COMPILING", 3 * per_state)
+    monkeypatch.setattr(compiled_derivatives, "WORTH_COMPILING", 3 * per_state)
     for count in range(1, 5):
         model.derivatives(q, u)
         assert in_use(model) == (count > 3)
 
 
 def test_without_a_compiler_the_tape_goes_on(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(tangent_kernels, "WORTH_COMPILING", 0)
+    monkeypatch.setattr(compiled_derivatives, "WORTH_COMPILING", 0)
     monkeypatch.setenv("CC", "/bin/false")
     data, q, u = seeded_scene(11, most=2)
     model = mstmm.compile(mstmm.Scene(**data))
@@ -81,7 +81,7 @@ def test_without_a_compiler_the_tape_goes_on(cache: Path, monkeypatch: pytest.Mo
 
 
 def test_the_looped_engine_never_compiles(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(tangent_kernels, "WORTH_COMPILING", 0)
+    monkeypatch.setattr(compiled_derivatives, "WORTH_COMPILING", 0)
     data, q, u = seeded_scene(11, most=2)
     model = mstmm.compile(mstmm.Scene(**data), engine="looped")
     model.derivatives(q, u)
@@ -89,7 +89,7 @@ def test_the_looped_engine_never_compiles(cache: Path, monkeypatch: pytest.Monke
 
 
 def test_another_library_is_refused(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(tangent_kernels, "WORTH_COMPILING", 0)
+    monkeypatch.setattr(compiled_derivatives, "WORTH_COMPILING", 0)
     data, q, u = seeded_scene(11, types=("pin",), most=1)
     model = mstmm.compile(mstmm.Scene(**data))
     model.derivatives(q, u)

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from mstmm.errors import NumericalFailure
-from mstmm.runtime.engine.statics.static_equilibrium import (
+from mstmm.runtime.engine.static_equilibrium import (
     EquilibriumNotFoundError,
     EquilibriumProblem,
     UndeterminedEquilibriumError,

@@ -1,1 +1,0 @@
-"""Static equilibrium: search and stability."""
