@@ -1,7 +1,12 @@
-"""Application with all commands.  Importing this module loads typer and nothing heavier."""
+"""Application with all commands.  Importing this module loads typer and nothing heavier.
+
+The module of a command is loaded when the command runs, or when the help lists all of them.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
+from importlib import import_module
 from typing import Annotated, Any
 
 import typer
@@ -9,27 +14,60 @@ from typer.core import TyperGroup
 
 from mstmm.errors import Interrupted
 
-from .cache import cache
-from .check import check
-from .demo import demo
-from .doctor import doctor
-from .export_robot import export_robot
-from .generate import generate
-from .graphics.plot import plot
-from .graphics.report import report
-from .graphics.view import view
-from .import_robot import import_robot
-from .list_elements import list_elements
-from .show import show
-from .simulate.command import simulate
-from .studies.advise import advise
-from .studies.chart import chart
-from .studies.linear import frf, linearize, modes
-from .studies.stability import stability
+from .options import flat_options
+
+#: Command -> module and function, in the order of the help.
+_COMMANDS = {
+    "demo": ("demo", "demo"),
+    "simulate": ("simulate", "simulate"),
+    "view": ("graphics", "view"),
+    "report": ("graphics", "report"),
+    "plot": ("graphics", "plot"),
+    "chart": ("experiments", "chart"),
+    "advise": ("experiments", "advise"),
+    "linearize": ("linear", "linearize"),
+    "modes": ("linear", "modes"),
+    "frf": ("linear", "frf"),
+    "check": ("check", "check"),
+    "import": ("robots", "import_robot"),
+    "export": ("robots", "export_robot"),
+    "list": ("list_elements", "list_elements"),
+    "show": ("show", "show"),
+    "stability": ("stability", "stability"),
+    "generate": ("generate", "generate"),
+    "cache": ("cache", "cache"),
+    "doctor": ("doctor", "doctor"),
+}
+
+
+class _Commands(Mapping[str, Any]):
+    """Commands by name, each loaded at its first use."""
+
+    def __init__(self) -> None:
+        self._loaded: dict[str, Any] = {}
+
+    def __getitem__(self, name: str) -> Any:
+        if name not in self._loaded:
+            module, function = _COMMANDS[name]
+            run = getattr(import_module(f".{module}", __package__), function)
+            single = typer.Typer(add_completion=False, rich_markup_mode=app.rich_markup_mode)
+            single.command(name)(flat_options(run))
+            self._loaded[name] = typer.main.get_command(single)
+        return self._loaded[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(_COMMANDS)
+
+    def __len__(self) -> int:
+        return len(_COMMANDS)
 
 
 class CommandGroup(TyperGroup):
     """Group of the commands, which reports an interrupt, where typer would exit silently."""
+
+    def __init__(self, **attributes: Any) -> None:
+        super().__init__(**attributes)
+        self.commands = _Commands()  # type: ignore[assignment]  # read only
 
     def invoke(self, ctx: Any) -> Any:
         try:
@@ -75,24 +113,3 @@ def mstmm(
         from .terminal_output import write_stdout
 
         write_stdout(context.get_help())
-
-
-app.command("demo")(demo)
-app.command("simulate")(simulate)
-app.command("view")(view)
-app.command("report")(report)
-app.command("plot")(plot)
-app.command("chart")(chart)
-app.command("advise")(advise)
-app.command("linearize")(linearize)
-app.command("modes")(modes)
-app.command("frf")(frf)
-app.command("check")(check)
-app.command("import")(import_robot)
-app.command("export")(export_robot)
-app.command("list")(list_elements)
-app.command("show")(show)
-app.command("stability")(stability)
-app.command("generate")(generate)
-app.command("cache")(cache)
-app.command("doctor")(doctor)

@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .error_messages import ENVIRONMENT
-from .options import Json, parse_not_negative, quote
+from .error_boundary import ENVIRONMENT
+from .options import Json, option, parse_not_negative, quote
+from .run_summary import count_text
+from .terminal_output import build_table, print_error, print_json, print_lines, table_console
 
 if TYPE_CHECKING:
     from mstmm.runtime.libraries.cache_maintenance import ListedEntry
@@ -17,6 +19,8 @@ if TYPE_CHECKING:
 ACTIONS = ("list", "verify", "clean")
 
 _DAY = 86400.0
+
+_UNUSED_HELP = "clean: delete only entries unused for this many days."
 
 
 def cache(
@@ -27,15 +31,7 @@ def cache(
             help="list the libraries; verify their checksums; clean: delete them.",
         ),
     ] = "list",
-    unused: Annotated[
-        float,
-        typer.Option(
-            "--unused",
-            metavar="DAYS",
-            parser=parse_not_negative,
-            help="clean: delete only entries unused for this many days.",
-        ),
-    ] = 0.0,
+    unused: Annotated[float, option("--unused", "DAYS", _UNUSED_HELP, parse_not_negative)] = 0.0,
     json: Json = False,
 ) -> None:
     """List, verify or delete compiled scene libraries."""
@@ -56,25 +52,21 @@ def _list_entries(folder: Path, json: bool, verify: bool) -> None:
     from mstmm.runtime.libraries.cache_folder import size_limit
     from mstmm.runtime.libraries.cache_maintenance import count_unfinished_builds, list_entries
 
-    from . import terminal_output
-
     entries, unfinished_count = list_entries(folder), count_unfinished_builds(folder)
     damaged = [entry for entry in entries if entry.problem]
     size = sum(entry.bytes for entry in entries)
     if json:
-        terminal_output.print_json({
+        print_json({
             "ok": not damaged, "folder": str(folder), "bytes": size, "limit": size_limit(),
             "unfinished": unfinished_count, "entries": [_entry_data(entry) for entry in entries],
         })  # fmt: skip
     else:
         if not verify and entries:
             columns = ("library", "kB>", "last used", "compiled in s>", "compiler", "state")
-            terminal_output.table_console().print(
-                terminal_output.build_table("", columns, map(_entry_row, entries))
-            )
+            table_console().print(build_table("", columns, map(_entry_row, entries)))
         _print_summary(folder, entries, size, size_limit(), unfinished_count)
         for entry in damaged:
-            terminal_output.print_error(
+            print_error(
                 f"{entry.folder.name} is corrupt: {entry.problem}; it is rebuilt when used; "
                 "mstmm cache clean deletes it"
             )
@@ -85,33 +77,23 @@ def _list_entries(folder: Path, json: bool, verify: bool) -> None:
 def _print_summary(
     folder: Path, entries: list[ListedEntry], size: int, limit: int, cut_off: int
 ) -> None:
-    from . import terminal_output
-    from .run_summary import count_text
-
     intact_count = sum(1 for entry in entries if not entry.problem)
-    terminal_output.print_lines(
+    print_lines(
         f"{folder}: {count_text(len(entries), 'library', 'libraries')}, {intact_count} intact; "
         f"{size / 1e6:.1f} of {limit / 1e6:.0f} MB"
     )
     if cut_off:
-        terminal_output.print_lines(
-            f"{count_text(cut_off, 'build', 'builds')} in progress or interrupted"
-        )
+        print_lines(f"{count_text(cut_off, 'build', 'builds')} in progress or interrupted")
 
 
 def _delete_entries(folder: Path, unused: float, json: bool) -> None:
     from mstmm.runtime.libraries.cache_maintenance import clean_cache
 
-    from . import terminal_output
-    from .run_summary import count_text
-
     removed, size = clean_cache(folder, unused * _DAY)
     if json:
-        terminal_output.print_json(
-            {"ok": True, "folder": str(folder), "removed": removed, "bytes": size}
-        )
+        print_json({"ok": True, "folder": str(folder), "removed": removed, "bytes": size})
     else:
-        terminal_output.print_lines(
+        print_lines(
             f"{folder}: deleted {count_text(removed, 'library', 'libraries')}, {size / 1e6:.1f} MB"
         )
 

@@ -10,7 +10,12 @@ import typer
 
 from mstmm.errors import ElementError, LoopClosureError, MstmmError
 
-from .options import Json, quote, require_python_file
+from .error_boundary import message_and_code
+from .model_loading import compile_file, generate_elements
+from .options import Json, flag, option, quote, require_python_file
+from .run_summary import count_text
+from .stored_elements import find_element
+from .terminal_output import print_error, print_json, print_lines
 
 if TYPE_CHECKING:
     from mstmm.pipeline.crosscheck import CrossCheckReport as Crosscheck
@@ -20,6 +25,8 @@ if TYPE_CHECKING:
     from mstmm.scene.checks.topology import Topology
 
 Report = dict[str, Any]
+
+_ASSEMBLED_HELP = "Print the scene with assembled initial conditions (all loops closed)."
 
 
 def check(
@@ -31,30 +38,15 @@ def check(
             "list).",
         ),
     ],
-    echo: Annotated[
-        bool, typer.Option("--echo", help="Print scenes with every default filled in.")
-    ] = False,
-    assembled: Annotated[
-        bool,
-        typer.Option(
-            "--assembled",
-            help="Print the scene with assembled initial conditions (all loops closed).",
-        ),
-    ] = False,
+    echo: Annotated[bool, flag("--echo", "Print scenes with every default filled in.")] = False,
+    assembled: Annotated[bool, flag("--assembled", _ASSEMBLED_HELP)] = False,
     hinge: Annotated[
-        list[str] | None,
-        typer.Option("--hinge", metavar="FILE", help="Python file that defines user elements."),
+        list[str] | None, option("--hinge", "FILE", "Python file that defines user elements.")
     ] = None,
     json: Json = False,
 ) -> None:
     """Validate scenes and element definitions, and verify kernels against their equations."""
-    from .error_messages import message_and_code
-    from .terminal_output import print_error, print_json, print_lines
-
-    if hinge:
-        from .model_loading import generate_elements
-
-        generate_elements(hinge)
+    generate_elements(hinge or [])
     reports: list[Report] = []
     highest_code = 0
     for name in what:
@@ -106,8 +98,6 @@ def _check_scene(path: str) -> Report:
     import mstmm
     from mstmm.runtime.packing.merging.simplification import COUNT_TEXTS
     from mstmm.runtime.run.step_stability import find_fastest_motion
-
-    from .model_loading import compile_file
 
     scene = mstmm.load_scene(path)
     model = compile_file(path, scene)
@@ -173,10 +163,8 @@ _PLURAL_NOUNS = {"elastic": "elastic bodies"}
 def _scene_text(
     path: str, scene: Scene, sizes: dict[str, int], warnings: list[str], choices: list[str]
 ) -> str:
-    from . import run_summary
-
     counts = ", ".join(
-        run_summary.count_text(number, _SINGULAR_NOUNS[name], _PLURAL_NOUNS.get(name, name))
+        count_text(number, _SINGULAR_NOUNS[name], _PLURAL_NOUNS.get(name, name))
         for name, number in sizes.items()
         if number
     )
@@ -291,8 +279,6 @@ def _tree_depth(tree: Topology, depth: dict[int, int], place: int) -> int:
 def _check_element(name: str) -> Report:
     """Cross-check a built-in or stored element: equations, intermediate representation and C."""
     from mstmm.pipeline.crosscheck import crosscheck
-
-    from .element_names import find_element
 
     return _crosscheck_report([crosscheck(*find_element(name))])
 

@@ -7,10 +7,13 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .extra_checks import install_command, missing_packages, result_ending
+from mstmm.optional_packages import missing_packages
+
+from . import run_summary
 from .model_loading import load_method
-from .options import Json, output_file
+from .options import Json, missing_extra, output_file, result_ending
 from .progress import progress_bar
+from .terminal_output import print_json, print_lines
 
 if TYPE_CHECKING:
     from mstmm.runtime.result.result import Result
@@ -56,8 +59,6 @@ def demo(json: Json = False) -> None:
     """Run an example and write its result, plots, animation and table to the current folder."""
     from mstmm.runtime.platform_support.safe_files import write_text
 
-    from . import run_summary, terminal_output
-
     scene, result_file, table_file, picture, animation = _output_files()
     kept_note = _write_scene(scene)
     result, seconds = _simulate(scene_text())
@@ -83,16 +84,20 @@ def demo(json: Json = False) -> None:
     )
     if json:
         data = run_summary.to_json(result, seconds, verdict)
-        terminal_output.print_json({**data, "files": [str(path) for path in descriptions]})
+        print_json({**data, "files": [str(path) for path in descriptions]})
         return
-    terminal_output.print_lines(text)
-    terminal_output.print_lines()
+    print_lines(text)
+    print_lines()
     for path, description in descriptions.items():
-        terminal_output.print_lines(f"{path!s:<11}{description}")
-    for line in _missing_extra_lines():
-        terminal_output.print_lines(line)
-    terminal_output.print_lines()
-    terminal_output.print_lines(NEXT_STEPS)
+        print_lines(f"{path!s:<11}{description}")
+    for line in (
+        *missing_extra("no plot: it needs", "plot"),
+        *missing_extra("no animation: it needs", "view"),
+        *missing_extra("CSV, as NetCDF needs", "io"),
+    ):
+        print_lines(line)
+    print_lines()
+    print_lines(NEXT_STEPS)
 
 
 def _output_files() -> tuple[Path, Path, Path, Path | None, Path | None]:
@@ -132,21 +137,3 @@ def _simulate(text: str) -> tuple[Result, float]:
         progress.label("estimating the error")
         result = certify_result(result, progress)
     return result, seconds
-
-
-def _missing_extra_lines() -> list[str]:
-    lines = []
-    if missing_packages("plot"):
-        lines.append(
-            f"no plot: it needs {', '.join(missing_packages('plot'))}: {install_command('plot')}"
-        )
-    if missing_packages("view"):
-        lines.append(
-            f"no animation: it needs {', '.join(missing_packages('view'))}: "
-            f"{install_command('view')}"
-        )
-    if missing_packages("io"):
-        lines.append(
-            f"CSV, as NetCDF needs {', '.join(missing_packages('io'))}: {install_command('io')}"
-        )
-    return lines

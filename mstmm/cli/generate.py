@@ -10,9 +10,13 @@ import typer
 
 from mstmm.errors import EnvironmentFailure, MstmmError
 
-from .options import Json, require_python_file
+from .options import Json, flag, require_python_file
+from .terminal_output import print_error, print_json, print_lines, print_note
 
 OUT_OF_DATE_CODE = 2
+
+_CHECK_HELP = "Derive again and compare with the committed C; write nothing."
+_INSTALLED_HELP = "Generate the elements provided by installed packages (mstmm list installed)."
 
 
 def generate(
@@ -23,19 +27,8 @@ def generate(
             help="Python files defining elements; without one, regenerate the package's C code.",
         ),
     ] = None,
-    check: Annotated[
-        bool,
-        typer.Option(
-            "--check", help="Derive again and compare with the committed C; write nothing."
-        ),
-    ] = False,
-    installed: Annotated[
-        bool,
-        typer.Option(
-            "--installed",
-            help="Generate the elements provided by installed packages (mstmm list installed).",
-        ),
-    ] = False,
+    check: Annotated[bool, flag("--check", _CHECK_HELP)] = False,
+    installed: Annotated[bool, flag("--installed", _INSTALLED_HELP)] = False,
     json: Json = False,
 ) -> None:
     """Derive, generate and compile user elements, or the generated/ folder of a checkout."""
@@ -58,8 +51,6 @@ def _generate_user_elements(files: list[str], json: bool) -> None:
     """Generate the elements of files, or without files those of installed packages."""
     import mstmm
     from mstmm.pipeline.compilation import generate_published
-
-    from .terminal_output import print_json, print_lines
 
     generated: list[dict[str, Any]] = []
     for file in files or [""]:
@@ -106,8 +97,6 @@ def _checkout_folder() -> Path:
 def _regenerate(json: bool) -> None:
     from mstmm.derive.catalogue.generate import regenerate
 
-    from .terminal_output import print_json, print_lines, print_note
-
     folder = _checkout_folder()
     print_note("deriving every element; this takes a while")
     written = [path.name for path in regenerate(folder)]
@@ -120,8 +109,6 @@ def _regenerate(json: bool) -> None:
 
 def _compare_with_committed(json: bool) -> None:
     from mstmm.derive.catalogue.generate import differences
-
-    from .terminal_output import print_error, print_json, print_lines, print_note
 
     folder = _generated_folder()
     if not json:

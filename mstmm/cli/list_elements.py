@@ -11,11 +11,11 @@ import typer
 from mstmm.display import escape_control_characters
 
 from .options import Json, quote
+from .stored_elements import Entry, builtin_entries, entry_from_spec, name_with_unit
+from .terminal_output import build_table, print_json, table_console
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
-
-    from .stored_elements import Entry
 
 
 class Section(NamedTuple):
@@ -29,8 +29,6 @@ class Section(NamedTuple):
 
 def _hinge_section() -> Section:
     from mstmm.ir.hinge_properties import builtin_hinges
-
-    from .stored_elements import Entry, name_with_unit
 
     entries = [
         Entry(
@@ -56,8 +54,6 @@ _RIGID_BODY_PARAMETERS = ("mass [kg]", "center_of_mass [m]", "inertia [kg*m2]")
 
 
 def _element_section(kind: str, title: str) -> Section:
-    from .stored_elements import builtin_entries
-
     entries = [
         replace(e, parameters=_RIGID_BODY_PARAMETERS) if (kind, e.name) == ("body", "rigid") else e
         for e in builtin_entries(kind)
@@ -97,8 +93,6 @@ def _key_section(title: str, owners: Sequence[tuple[str, type[BaseModel]]]) -> S
 
 
 def _matrix_section() -> Section:
-    from .stored_elements import builtin_entries
-
     rows = [
         (f"classical_{entry.name}", entry.title, "; ".join(entry.sources))
         for entry in builtin_entries("classical")
@@ -108,8 +102,6 @@ def _matrix_section() -> Section:
 
 
 def _sweep_section() -> Section:
-    from .stored_elements import builtin_entries
-
     rows = [(f"sweep_{e.name}", e.title) for e in builtin_entries("sweep")]
     data = [{"name": name, "title": title} for name, title in rows]
     return Section("steps of the sweep", ("name", "description"), rows, data)
@@ -148,8 +140,6 @@ def _method_section() -> Section:
 
 def _user_section() -> Section:
     from mstmm.runtime.kernels import kernel_store
-
-    from .stored_elements import entry_from_spec
 
     entries = [entry_from_spec(spec) for spec in kernel_store.all_specs().values()]
     rows = [
@@ -209,16 +199,14 @@ def list_elements(
     json: Json = False,
 ) -> None:
     """List hinges, bodies, forces, laws, transfer matrices, methods and user elements."""
-    from . import terminal_output
-
     sections = {part: SECTIONS[part]() for part in _select_parts(parts or [])}
     if json:
-        terminal_output.print_json({part: section.data for part, section in sections.items()})
+        print_json({part: section.data for part, section in sections.items()})
         return
-    console = terminal_output.table_console()
+    console = table_console()
     for section in sections.values():
         if section.rows:
-            console.print(terminal_output.build_table(section.title, section.columns, section.rows))
+            console.print(build_table(section.title, section.columns, section.rows))
         else:
             console.print(f"{escape_control_characters(section.title)}: none")
         console.print()

@@ -1,19 +1,21 @@
-"""Parsers and options common to several commands: numbers, output files, `--json`."""
+"""Declaration of the options of commands; parsers and options common to several of them."""
 
 from __future__ import annotations
 
 import math
 import os
 import tempfile
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import MISSING, dataclass, fields, is_dataclass
+from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
 from mstmm.argument_validation import parse_number
 from mstmm.errors import EnvironmentFailure, MstmmError, SceneError
+from mstmm.optional_packages import missing_packages
 
 if TYPE_CHECKING:
     from mstmm.scene import Scene
@@ -21,20 +23,70 @@ if TYPE_CHECKING:
 #: Largest number of samples of a run.
 MAX_SAMPLES = 10_000_000
 
+#: Endings of files of results, plots and animations.
+RESULT_ENDINGS = (".nc", ".csv", ".mat")
+PLOT_ENDINGS = (".png", ".svg", ".pdf")
+VIEW_ENDINGS = (".html", ".png", ".svg", ".pdf", ".gif", ".mp4")
+
 
 def option(
-    name: str,
+    names: str,
     metavar: str,
     description: str,
     parser: Callable[[Any], Any] | None = None,
     **more: Any,
 ) -> Any:
     """Option such as "--step" or "--input/-i", with its value's name and its help text."""
-    return typer.Option(*name.split("/"), metavar=metavar, help=description, parser=parser, **more)
+    return typer.Option(*names.split("/"), metavar=metavar, help=description, parser=parser, **more)
 
 
-json_option = typer.Option("--json", help="Print JSON instead of text.")
-Json = Annotated[bool, json_option]
+def flag(names: str, description: str) -> Any:
+    """Option without a value, such as "--json" or "--certify/--no-certify"."""
+    return typer.Option(names, help=description)
+
+
+def flat_options(run: Callable[..., None]) -> Callable[..., None]:
+    """Command of a function, with one option for each field of a parameter that is a dataclass.
+
+    A parameter stands for a dataclass by its annotation, or by a dataclass in `Annotated`.
+    """
+    groups: dict[str, Any] = {}
+    parameters: list[Parameter] = []
+    for parameter in _parameters_of(run, signature(run).parameters.values()):
+        group = next(filter(is_dataclass, (parameter.annotation, *_metadata(parameter))), None)
+        if group is None:
+            parameters.append(parameter)
+        else:
+            groups[parameter.name] = group, _parameters_of(group, _option_fields(group))
+            parameters += groups[parameter.name][1]
+
+    def command(**values: Any) -> None:
+        for name, (group, members) in groups.items():
+            values[name] = group(**{member.name: values.pop(member.name) for member in members})
+        run(**values)
+
+    command.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
+    command.__annotations__ = {p.name: p.annotation for p in parameters}
+    command.__doc__, command.__name__ = run.__doc__, run.__name__
+    return command
+
+
+def _metadata(parameter: Parameter) -> tuple[Any, ...]:
+    return getattr(parameter.annotation, "__metadata__", ())
+
+
+def _option_fields(group: Any) -> Iterator[Parameter]:
+    """Fields of a dataclass that are options, as parameters."""
+    for item in fields(group):
+        if item.init and item.default_factory is MISSING:
+            default = Parameter.empty if item.default is MISSING else item.default
+            yield Parameter(item.name, Parameter.KEYWORD_ONLY, default=default)
+
+
+def _parameters_of(owner: Any, given: Iterable[Parameter]) -> list[Parameter]:
+    """Keyword parameters with evaluated annotations."""
+    hints = get_type_hints(owner, include_extras=True)
+    return [p.replace(kind=Parameter.KEYWORD_ONLY, annotation=hints[p.name]) for p in given]
 
 
 def quote(text: Any) -> str:
@@ -233,6 +285,46 @@ def output_folder(text: str, file: str, option: str = "--out") -> Path:
     return path
 
 
+# --- optional packages ----------------------------------------------------------------------------
+
+_EXTRA_BY_SUFFIX = {
+    ".nc": "io", ".png": "plot", ".svg": "plot", ".pdf": "plot", ".gif": "plot", ".mp4": "plot",
+    ".html": "view",
+}  # fmt: skip
+
+
+def install_command(extra: str) -> str:
+    """Command that installs an extra."""
+    return f"pip install 'mstmm[{extra}]'"
+
+
+def missing_extra(what: str, extra: str) -> list[str]:
+    """Line that names the missing packages of an extra, as a list; empty if there are none."""
+    missing = missing_packages(extra)
+    return [f"{what} {', '.join(missing)}: {install_command(extra)}"] if missing else []
+
+
+def require_extra_for(path: Path, option: str) -> None:
+    """Raise EnvironmentFailure if writing this file needs a package that is not installed."""
+    extra = _EXTRA_BY_SUFFIX.get(path.suffix.lower())
+    if extra is not None and missing_packages(extra):
+        alternative = "; or use a name ending in .csv" if extra == "io" else ""
+        raise EnvironmentFailure(
+            f"{option} {path}: this needs {', '.join(missing_packages(extra))}, not installed: "
+            f"{install_command(extra)}{alternative}"
+        )
+
+
+def result_ending() -> str:
+    """Default ending of a result file: .nc if NetCDF can be written, else .csv."""
+    return ".csv" if missing_packages("io") else ".nc"
+
+
+def title_from_path(path: Path) -> str:
+    """Name of the file, or of its folder if the file is named "scene"."""
+    return path.absolute().parent.name if path.stem == "scene" else path.stem
+
+
 def require_python_file(path: str) -> str:
     """Check that a path is an existing Python file; MstmmError for anything else."""
     if not path.endswith(".py"):
@@ -243,20 +335,17 @@ def require_python_file(path: str) -> str:
 
 
 #: Options of several commands.
+SceneFile = Annotated[str, typer.Argument(metavar="SCENE", help="Scene file, .toml or .json.")]
+EndTime = Annotated[float, option("--t-end", "S", "End time, s.", parse_positive)]
+Plot = Annotated[str | None, option("--plot", "FILE", "Plot file: .png, .svg or .pdf.")]
 Elements = Annotated[
     list[str] | None,
-    typer.Option("--hinge", metavar="FILE", help="Python file that defines user elements (it is "
-                 "executed); repeatable."),
-]  # fmt: skip
+    option(
+        "--hinge", "FILE", "Python file that defines user elements (it is executed); repeatable."
+    ),
+]
 Budget = Annotated[
-    float,
-    typer.Option(
-        "--budget", metavar="SECONDS", parser=parse_positive, help="Wall-clock time limit, s."
-    ),
+    float, option("--budget", "SECONDS", "Wall-clock time limit, s.", parse_positive)
 ]
-Rounds = Annotated[
-    int,
-    typer.Option(
-        "--rounds", metavar="N", parser=integer_parser(0), help="Number of timing repetitions."
-    ),
-]
+Rounds = Annotated[int, option("--rounds", "N", "Number of timing repetitions.", integer_parser(0))]
+Json = Annotated[bool, flag("--json", "Print JSON instead of text.")]

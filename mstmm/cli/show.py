@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from mstmm.errors import ElementError
 
-from .options import Json, output_file, quote, require_python_file
+from . import stored_elements
+from .options import Json, flag, option, output_file, quote, require_python_file
+from .terminal_output import print_json, print_note, write_stdout
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -20,15 +22,18 @@ STAGES = ("equations", "matrix", "ir", "c")
 FORMATS = ("text", "latex", "html")
 
 
-def choices_text(words: tuple[str, ...]) -> str:
-    """Choices in the notation of the help."""
-    return "|".join(words)
+_BESIDE_HELP = "Show the classical transfer matrix next to the motion subspace."
 
 
-def _require_choice(text: str, words: tuple[str, ...]) -> str:
-    if text not in words:
-        raise typer.BadParameter(f"{quote(text)}: expected one of {', '.join(words)}")
-    return text
+def _choice(name: str, words: tuple[str, ...], description: str) -> Any:
+    """Option whose value is one of several words."""
+
+    def parse(text: str) -> str:
+        if text not in words:
+            raise typer.BadParameter(f"{quote(text)}: expected one of {', '.join(words)}")
+        return text
+
+    return option(name, "|".join(words), description, parse)
 
 
 def show(
@@ -40,40 +45,18 @@ def show(
             "schedule.",
         ),
     ],
-    at: Annotated[
-        str,
-        typer.Option(
-            "--at", metavar=choices_text(STAGES), help="Stage to show.",
-            parser=lambda text: _require_choice(text, STAGES),
-        ),
-    ] = "equations",
-    format: Annotated[
-        str,
-        typer.Option(
-            "--format", metavar=choices_text(FORMATS), help="Output format.",
-            parser=lambda text: _require_choice(text, FORMATS),
-        ),
-    ] = "text",
-    output: Annotated[
-        str | None, typer.Option("--output", "-o", metavar="FILE", help="Output file.")
-    ] = None,
+    at: Annotated[str, _choice("--at", STAGES, "Stage to show.")] = "equations",
+    format: Annotated[str, _choice("--format", FORMATS, "Output format.")] = "text",
+    output: Annotated[str | None, option("--output/-o", "FILE", "Output file.")] = None,
     keep: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--keep", metavar="NAME", help="Scene parameter to keep symbolic; repeatable."
-        ),
+        list[str] | None, option("--keep", "NAME", "Scene parameter to keep symbolic; repeatable.")
     ] = None,
-    beside: Annotated[
-        bool, typer.Option("--beside", help="Show the classical transfer matrix next to the motion "
-                           "subspace.")
-    ] = False,
+    beside: Annotated[bool, flag("--beside", _BESIDE_HELP)] = False,
     json: Json = False,
-) -> None:  # fmt: skip
+) -> None:
     """Show the equations, transfer matrix, intermediate representation or C of an element."""
     from mstmm.runtime.platform_support.safe_files import write_text
     from mstmm.scene.load import is_scene_file
-
-    from .terminal_output import print_json, print_note, write_stdout
 
     target = None if output is None else output_file(output, ())
     if beside:
@@ -101,8 +84,6 @@ def show(
 def _schedule_page(at: str, format: str) -> str:
     from mstmm.derive.show.schedule_page import sweep_page
 
-    from . import stored_elements
-
     return sweep_page(at, format, stored_elements.generated_specs)
 
 
@@ -110,9 +91,9 @@ def _comparison_page(element: str, format: str) -> str:
     from mstmm.derive.show.classical_comparison import classical_comparison
     from mstmm.derive.show.show_page import render_page
 
-    from .element_names import find_element
-
-    return render_page(*classical_comparison("_".join(find_element(element))), format)
+    return render_page(
+        *classical_comparison("_".join(stored_elements.find_element(element))), format
+    )
 
 
 def _scene_page(file: str, at: str, format: str, keep: list[str]) -> str:
@@ -136,9 +117,6 @@ def _element_views(element: str, at: str) -> list[ElementView]:
     """Views of a built-in element, of one in the kernel store, or of all in a file."""
     from mstmm.derive.show import subjects as views
 
-    from . import stored_elements
-    from .element_names import find_element
-
     if element.endswith(".py"):
         from mstmm.derive.catalogue.registry import load_file
         from mstmm.derive.verification.definition_checks import check_element
@@ -147,7 +125,7 @@ def _element_views(element: str, at: str) -> list[ElementView]:
         for definition in definitions:
             check_element(definition)
         return [views.view_of_element(definition) for definition in definitions]
-    kind, name = find_element(element)
+    kind, name = stored_elements.find_element(element)
     full_name = f"{kind}_{name}"
     if name not in (entry.name for entry in stored_elements.builtin_entries(kind)):
         return [_view_from_store(kind, name, at)]

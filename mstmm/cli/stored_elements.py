@@ -1,4 +1,4 @@
-"""Generated elements, read from JSON, so that no derivation is repeated."""
+"""Generated elements by name, read from JSON, so that no derivation is repeated."""
 
 from __future__ import annotations
 
@@ -8,8 +8,12 @@ from functools import cache
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
+from mstmm.errors import ElementError
+
 if TYPE_CHECKING:
     from mstmm.ir.element_spec import ElementSpec
+
+KINDS = ("hinge", "body", "force", "classical", "sweep")
 
 
 @dataclass(frozen=True)
@@ -79,3 +83,33 @@ def generated_specs() -> dict[tuple[str, str], ElementSpec]:
 
     texts = {(e.kind, e.name): generated_text(f"{e.kind}_{e.name}", ".json") for e in _catalogue()}
     return {key: element_from_json(data) for key, data in texts.items() if data is not None}
+
+
+def element_index() -> dict[str, tuple[str, str]]:
+    """Index of built-in and stored elements: full name (hinge_pin) -> (kind, name)."""
+    from mstmm.runtime.kernels import kernel_store
+
+    built_in = [(e.kind, e.name) for kind in KINDS for e in builtin_entries(kind)]
+    names = {
+        f"{kind}_{name}": (kind, name)
+        for kind, name in [*built_in, *sorted(kernel_store.all_specs())]
+    }
+    return names | {"hinge_elastic": ("hinge", "free")}  # same motion; its law is in sweep_laws
+
+
+def find_element(name: str) -> tuple[str, str]:
+    """Find (kind, name) of an element by its full name "hinge_pin", or by "pin".
+
+    The short name means the first kind that has it.  Raises ElementError, with the nearest name, if
+    there is no such element.
+    """
+    from mstmm.scene.validators.validation_messages import did_you_mean
+
+    names = element_index()
+    for full_name in (name, *(f"{kind}_{name}" for kind in KINDS)):
+        if full_name in names:
+            return names[full_name]
+    hint = did_you_mean(name, [*names, *(short_name for _, short_name in names.values())])
+    if "did you mean" not in hint:
+        hint = "; mstmm list shows all elements"
+    raise ElementError(f'element "{name:.60}": there is no such element{hint}')

@@ -34,7 +34,7 @@ def test_demo_leaves_result_table_picture_and_scene(mstmm: Command, folder: Path
 
 
 def test_with_the_core_alone(mstmm: Command, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("mstmm.cli.extra_checks.missing_packages", lambda extra: ["something"])
+    monkeypatch.setattr("mstmm.cli.options.missing_packages", lambda extra: ["something"])
     monkeypatch.setattr("mstmm.cli.demo.missing_packages", lambda extra: ["something"])
     done = mstmm("demo")
     assert done.code == 0

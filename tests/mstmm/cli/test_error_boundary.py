@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from mstmm import errors
-from mstmm.cli.error_messages import message_and_code
+from mstmm.cli.error_boundary import message_and_code
 from mstmm.optional_packages import missing_package_error
 from tests.support.commands import Command
 

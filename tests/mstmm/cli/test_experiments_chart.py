@@ -77,7 +77,7 @@ def test_bad_input(mstmm: Command, arguments: tuple[str, ...], words: str) -> No
 
 
 def test_without_matplotlib(mstmm: Command, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    import mstmm.cli.studies.chart as command
+    import mstmm.cli.options as command
     from mstmm.runtime.chart import chart as charts
 
     monkeypatch.setattr(command, "missing_packages", lambda _: ["matplotlib"])

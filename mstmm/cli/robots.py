@@ -1,4 +1,4 @@
-"""`mstmm import`: conversion of a robot file to a scene."""
+"""`mstmm import` and `mstmm export`: conversion of robot files to scenes, and of scenes to URDF."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ import typer
 
 from mstmm.display import abbreviate_names
 
-from .options import Json, new_file, parse_positive
+from .options import Json, SceneFile, flag, new_file, option, parse_positive
+from .terminal_output import print_json, print_lines
 
 if TYPE_CHECKING:
     from mstmm.scene.robots.robot_model import ImportNote
@@ -22,61 +23,35 @@ if TYPE_CHECKING:
 #: Largest number of elements named in one note.
 _MAX_NAMED = 4
 
+_SCENE_OUTPUT_HELP = "Scene file, .toml; default: robot name, current folder."
+_ROBOT_OUTPUT_HELP = "Robot file, .urdf; default: scene name, current folder."
+_BASE_HELP = "Attach the base to the ground (fixed) or leave it free."
+_STOPS_HELP = "Convert joint limits to stops of this stiffness (N m/rad or N/m)."
+_MIMICS_HELP = "Lock mimic joints at their initial values instead of coupling them."
+
 
 def import_robot(
     robot: Annotated[
         str, typer.Argument(metavar="ROBOT", help="Robot file: .urdf, or MJCF (.xml, .mjcf).")
     ],
-    output: Annotated[
-        str | None,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="FILE",
-            help="Scene file, .toml; default: robot name, current folder.",
-        ),
-    ] = None,
-    base: Annotated[
-        str,
-        typer.Option(
-            "--base",
-            metavar="fixed|free",
-            help="Attach the base to the ground (fixed) or leave it free.",
-        ),
-    ] = "fixed",
+    output: Annotated[str | None, option("--output/-o", "FILE", _SCENE_OUTPUT_HELP)] = None,
+    base: Annotated[str, option("--base", "fixed|free", _BASE_HELP)] = "fixed",
     keep_fixed: Annotated[
-        bool, typer.Option("--keep-fixed", help="Keep links on fixed joints as separate bodies.")
+        bool, flag("--keep-fixed", "Keep links on fixed joints as separate bodies.")
     ] = False,
     stops: Annotated[
-        float | None,
-        typer.Option(
-            "--stops",
-            metavar="STIFFNESS",
-            parser=parse_positive,
-            help="Convert joint limits to stops of this stiffness (N m/rad or N/m).",
-        ),
+        float | None, option("--stops", "STIFFNESS", _STOPS_HELP, parse_positive)
     ] = None,
-    hold_mimics: Annotated[
-        bool,
-        typer.Option(
-            "--hold-mimics",
-            help="Lock mimic joints at their initial values instead of coupling them.",
-        ),
-    ] = False,
+    hold_mimics: Annotated[bool, flag("--hold-mimics", _MIMICS_HELP)] = False,
     length: Annotated[
-        str,
-        typer.Option("--length", metavar="UNIT", help="Length unit of the file: m, cm, mm or in."),
+        str, option("--length", "UNIT", "Length unit of the file: m, cm, mm or in.")
     ] = "m",
-    mass: Annotated[
-        str, typer.Option("--mass", metavar="UNIT", help="Mass unit of the file: kg, g, t or lb.")
-    ] = "kg",
+    mass: Annotated[str, option("--mass", "UNIT", "Mass unit of the file: kg, g, t or lb.")] = "kg",
     json: Json = False,
 ) -> None:
     """Convert a robot (URDF, MJCF) to a scene, and list what could not be converted."""
     import mstmm
     from mstmm.runtime.platform_support.safe_files import write_text
-
-    from .terminal_output import print_json, print_lines
 
     target = new_file(output, robot, ".toml")
     imported = mstmm.import_robot(
@@ -89,10 +64,8 @@ def import_robot(
     if json:
         notes = [{"where": n.where, "element": n.element, "text": n.text} for n in imported.notes]
         print_json({"scene": str(target), "names": dict(imported.names), "notes": notes})
-        return
-    for line in grouped_notes(imported.notes, robot):
-        print_lines(line)
-    print_lines(f"{target}: {imported.scene.summary}")
+    else:
+        _print_notes(imported.notes, robot, f"{target}: {imported.scene.summary}")
 
 
 def _with_copied_meshes(found: ImportedRobot, target: Path) -> ImportedRobot:
@@ -121,15 +94,33 @@ def _with_copied_meshes(found: ImportedRobot, target: Path) -> ImportedRobot:
     return replace(found, tables={**found.tables, "shape": shapes})
 
 
-def grouped_notes(notes: Iterable[ImportNote], file: str) -> list[str]:
-    """One line for each text of notes, with its elements and their positions in `file`."""
+def export_robot(
+    scene: SceneFile,
+    output: Annotated[str | None, option("--output/-o", "FILE", _ROBOT_OUTPUT_HELP)] = None,
+    json: Json = False,
+) -> None:
+    """Convert a scene to URDF, and list what could not be converted."""
+    import mstmm
+    from mstmm.runtime.platform_support.safe_files import write_text
+
+    target = new_file(output, scene, ".urdf")
+    robot = mstmm.export_robot(mstmm.load_scene(scene), target.stem)
+    write_text(target, robot.text)
+    if json:
+        notes = [{"element": n.element, "text": n.text} for n in robot.notes]
+        print_json({"robot": str(target), "notes": notes})
+    else:
+        _print_notes(robot.notes, "scene", f"{target}: {robot.summary}")
+
+
+def _print_notes(notes: Iterable[ImportNote], file: str, summary: str) -> None:
+    """Print one line for each text of notes, with its elements and their positions in `file`."""
     elements_by_text = defaultdict[str, list[str]](list)
     for note in notes:
         position = note.where.removeprefix(file).removeprefix(": ")
         elements_by_text[note.text].append(
             f"{note.element} ({position})" if position else note.element
         )
-    return [
-        f"{abbreviate_names(elements, _MAX_NAMED)}: {text}"
-        for text, elements in elements_by_text.items()
-    ]
+    for text, elements in elements_by_text.items():
+        print_lines(f"{abbreviate_names(elements, _MAX_NAMED)}: {text}")
+    print_lines(summary)

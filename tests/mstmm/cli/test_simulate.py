@@ -141,7 +141,7 @@ def test_default_result_is_netcdf_beside_us(mstmm: Command, folder: Path) -> Non
 def test_without_the_extra_the_result_is_csv(
     mstmm: Command, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("mstmm.cli.extra_checks.missing_packages", lambda extra: ["h5netcdf"])
+    monkeypatch.setattr("mstmm.cli.options.missing_packages", lambda extra: ["h5netcdf"])
     assert mstmm("simulate", "pendulum.toml", "--t-end", "0.1").code == 0
     assert (folder / "pendulum.csv").is_file()
     refused = mstmm("simulate", "pendulum.toml", "-o", "x.nc")

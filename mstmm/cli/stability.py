@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..options import Json, output_folder
+from .options import Json, flag, install_command, missing_extra, option, output_folder
+from .progress import progress_bar
+from .terminal_output import build_table, print_json, print_lines, table_console
 
 if TYPE_CHECKING:
     from mstmm.atlas.atlas import Atlas
@@ -14,18 +16,12 @@ if TYPE_CHECKING:
 
 def stability(
     case: Annotated[
-        list[str] | None,
-        typer.Option("--case", metavar="NAME", help="Case to run; repeatable. [all]"),
+        list[str] | None, option("--case", "NAME", "Case to run; repeatable. [all]")
     ] = None,
     out: Annotated[
-        str | None,
-        typer.Option(
-            "--out", metavar="DIR", help="Output folder for atlas.json, atlas.md and plots."
-        ),
+        str | None, option("--out", "DIR", "Output folder for atlas.json, atlas.md and plots.")
     ] = None,
-    only_list: Annotated[
-        bool, typer.Option("--list", help="List the cases; nothing is computed.")
-    ] = False,
+    only_list: Annotated[bool, flag("--list", "List the cases; nothing is computed.")] = False,
     json: Json = False,
 ) -> None:
     """Locate the parameter values at which methods fail, and the range of each remedy."""
@@ -36,39 +32,32 @@ def stability(
         raise typer.BadParameter("give the output folder, --out DIR, or --list")
     from mstmm.atlas import cases
 
-    from .. import terminal_output
-    from ..extra_checks import install_command, missing_packages
-
     omitted_cases = [
         definition for definition in cases.select_cases(case) if definition.lacks and not case
     ]
-    folder, missing_plot_packages = output_folder(out, "atlas.json"), missing_packages("plot")
+    folder, no_plots = (
+        output_folder(out, "atlas.json"),
+        missing_extra("no plots: they need", "plot"),
+    )
     atlas = _measure_atlas(case)
-    files = atlas.save(folder, pictures=not missing_plot_packages)
+    files = atlas.save(folder, pictures=not no_plots)
     if json:
-        paths, names = (
-            [str(file) for file in files],
-            [definition.name for definition in omitted_cases],
-        )
-        terminal_output.print_json({**atlas.to_dict(), "left_out": names, "files": paths})
+        names = [definition.name for definition in omitted_cases]
+        print_json({**atlas.to_dict(), "left_out": names, "files": [str(file) for file in files]})
         return
     _print_atlas(atlas)
-    terminal_output.print_lines(f"{folder}: {', '.join(file.name for file in files)}")
+    print_lines(f"{folder}: {', '.join(file.name for file in files)}")
     for definition in omitted_cases:
-        terminal_output.print_lines(
+        print_lines(
             f"left out: {definition.name} needs {', '.join(definition.lacks)}: "
             f"{install_command(definition.extra)}"
         )
-    if missing_plot_packages:
-        terminal_output.print_lines(
-            f"no plots: they need {', '.join(missing_plot_packages)}: {install_command('plot')}"
-        )
+    for line in no_plots:
+        print_lines(line)
 
 
 def _list_cases(wanted: list[str] | None, json: bool) -> None:
     from mstmm.atlas import cases
-
-    from .. import terminal_output
 
     definitions = cases.select_cases(wanted)
     if json:
@@ -78,21 +67,17 @@ def _list_cases(wanted: list[str] | None, json: bool) -> None:
             | {"method": definition.method.name, "remedy": definition.remedy.name}
             for definition in definitions
         ]
-        terminal_output.print_json({"cases": rows})
+        print_json({"cases": rows})
         return
     lines = [
         (definition.name, definition.title, definition.parameter, definition.remedy.name)
         for definition in definitions
     ]
-    terminal_output.table_console().print(
-        terminal_output.build_table("", ("case", "what", "parameter", "remedy"), lines)
-    )
+    table_console().print(build_table("", ("case", "what", "parameter", "remedy"), lines))
 
 
 def _measure_atlas(wanted: list[str] | None) -> Atlas:
     from mstmm.atlas.atlas import stability as measured
-
-    from ..progress import progress_bar
 
     with progress_bar() as shown:
 
@@ -106,8 +91,6 @@ def _measure_atlas(wanted: list[str] | None) -> Atlas:
 def _print_atlas(atlas: Atlas) -> None:
     from mstmm.atlas.page import frontier_text, limit_text, parameter_with_unit, remedy_range
 
-    from .. import terminal_output
-
     columns = ("case", "parameter", "fails", "limit>", "remedy", "holds to>")
     rows = [
         (
@@ -120,4 +103,4 @@ def _print_atlas(atlas: Atlas) -> None:
         )
         for case in atlas.cases
     ]
-    terminal_output.table_console().print(terminal_output.build_table("", columns, rows))
+    table_console().print(build_table("", columns, rows))

@@ -1,31 +1,35 @@
-"""Options of `mstmm simulate`: one field each, declared for the command line here alone."""
+"""Options of `mstmm simulate`: one field each; those of methods are declared by the methods."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, fields, make_dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
+from typing import TYPE_CHECKING, Annotated, Any, get_args, get_type_hints
 
 from mstmm.defaults import ATOL, METHOD, RTOL
 from mstmm.errors import MstmmError
 from mstmm.runtime.integrate import methods
 
-from ..extra_checks import result_ending
-from ..graphics.plot import PLOT_ENDINGS, RESULT_ENDINGS
-from ..model_loading import EXTERNAL_PREFIXES
-from ..options import (
+from .model_loading import EXTERNAL_PREFIXES
+from .options import (
+    PLOT_ENDINGS,
+    RESULT_ENDINGS,
     Elements,
+    EndTime,
     Json,
     OutputTimes,
+    Plot,
+    SceneFile,
+    flag,
+    integer_parser,
     option,
     output_file,
     parse_not_negative,
     parse_positive,
     parse_times,
+    result_ending,
 )
 
 if TYPE_CHECKING:
@@ -73,8 +77,8 @@ _TURNS_HELP = "Tolerance for snapping to right angles, rad (1e-11; 0 switches it
 class RunOptions:
     """Options of a run as given; `method_options` are those of its integration method."""
 
-    scene: Annotated[str, typer.Argument(metavar="SCENE", help="Scene file, .toml or .json.")]
-    t_end: Annotated[float, option("--t-end", "S", "End time, s.", parse_positive)] = 10.0
+    scene: SceneFile
+    t_end: EndTime = 10.0
     method: Annotated[
         str | None,
         option("--method", "NAME", _METHOD_HELP, show_default=f"auto, {METHOD} with --step"),
@@ -97,15 +101,13 @@ class RunOptions:
     of: Annotated[list[str] | None, option("--of", "NAME", _OF_HELP)] = None
     times: Annotated[OutputTimes | None, option("--times", "N|DT", _TIMES_HELP, parse_times)] = None
     output: Annotated[str | None, option("--output/-o", "FILE", _OUTPUT_HELP)] = None
-    plot: Annotated[str | None, option("--plot", "FILE", "Plot file: .png, .svg or .pdf.")] = None
+    plot: Plot = None
     quantity: Annotated[list[str] | None, option("--quantity/-q", "NAME", _QUANTITY_HELP)] = None
     inputs: Annotated[list[str] | None, option("--input", "NAME=VALUE", _INPUT_HELP)] = None
     hinge: Elements = None
-    certify: Annotated[bool | None, typer.Option("--certify/--no-certify", help=_CERTIFY_HELP)] = (
-        None
-    )
+    certify: Annotated[bool | None, flag("--certify/--no-certify", _CERTIFY_HELP)] = None
     resume: Annotated[
-        bool, typer.Option("--resume", help="Continue an interrupted run, with the same options.")
+        bool, flag("--resume", "Continue an interrupted run, with the same options.")
     ] = False
     sweep: Annotated[str, option("--sweep", "NAME", _SWEEP_HELP)] = "auto"
     engine: Annotated[str, option("--engine", "NAME", _ENGINE_HELP)] = "auto"
@@ -114,7 +116,7 @@ class RunOptions:
         None
     )
     on_risk: Annotated[str, option("--on-risk", "ACTION", _ON_RISK_HELP)] = "warn"
-    simplify: Annotated[bool, typer.Option("--simplify/--no-simplify", help=_SIMPLIFY_HELP)] = True
+    simplify: Annotated[bool, flag("--simplify/--no-simplify", _SIMPLIFY_HELP)] = True
     turns: Annotated[float | None, option("--turns", "X", _TURNS_HELP, parse_not_negative)] = None
     json: Json = False
     method_options: Mapping[str, Any] = field(default_factory=dict)
@@ -175,3 +177,24 @@ class RunOptions:
                 "--accuracy with --error: a result is trusted if it reaches --error; leave out "
                 "--accuracy"
             )
+
+
+_PARSERS = {float: parse_not_negative, int: integer_parser(0), str: None}
+
+
+def _method_fields() -> Iterator[tuple[str, Any, Any]]:
+    """One field for each option of integration methods; None where it is not given."""
+    declared = {item.name: (family, item) for family in methods.FAMILIES for item in fields(family)}
+    for name, (family, item) in declared.items():
+        if name != "name":
+            hint = get_type_hints(family)[name]
+            kind: Any = (get_args(hint) or (hint,))[0]
+            given = option(
+                f"--{name.replace('_', '-')}", item.metadata["metavar"],
+                item.metadata["description"], _PARSERS[kind],
+            )  # fmt: skip
+            yield name, Annotated[kind | None, given], field(default=None)
+
+
+#: Options of all integration methods.
+MethodOptions = make_dataclass("MethodOptions", _method_fields(), frozen=True)

@@ -1,1 +1,0 @@
-"""Commands that display a run: animations, plots and reports."""

@@ -1,1 +1,0 @@
-"""Command `mstmm simulate`: options, resumable run, saving and output."""

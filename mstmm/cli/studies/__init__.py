@@ -1,1 +1,0 @@
-"""Commands for studies of a scene beyond a single run."""
