@@ -37,13 +37,12 @@ if TYPE_CHECKING:
     from .pipeline.compilation import generate_file, register
     from .pipeline.equations import equations
     from .pipeline.report.report import write_report
-    from .runtime.advice.advice import Advice
-    from .runtime.chart.chart import Chart
+    from .runtime.experiments.chart.chart import Chart
+    from .runtime.experiments.model_reduction.advice import Advice
+    from .runtime.experiments.run_request import ErrorRequest, Execution
     from .runtime.integrate import methods
-    from .runtime.model.execution import Execution
     from .runtime.model.model import Model
     from .runtime.model.result_loading import load_result
-    from .runtime.model.target_error.error_request import ErrorRequest
     from .runtime.result.result import Result
     from .scene import Scene
     from .scene.load import import_robot, load_scene
@@ -62,11 +61,11 @@ _LAZY = {
     "equations": (".pipeline.equations", "equations"),
     "write_report": (".pipeline.report.report", "write_report"),
     "generate_file": (".pipeline.compilation", "generate_file"),
-    "Advice": (".runtime.advice.advice", "Advice"),
-    "Chart": (".runtime.chart.chart", "Chart"),
+    "Advice": (".runtime.experiments.model_reduction.advice", "Advice"),
+    "Chart": (".runtime.experiments.chart.chart", "Chart"),
     "methods": (".runtime.integrate.methods", ""),
-    "Execution": (".runtime.model.execution", "Execution"),
-    "ErrorRequest": (".runtime.model.target_error.error_request", "ErrorRequest"),
+    "Execution": (".runtime.experiments.run_request", "Execution"),
+    "ErrorRequest": (".runtime.experiments.run_request", "ErrorRequest"),
     "Model": (".runtime.model.model", "Model"),
     "Result": (".runtime.result.result", "Result"),
     "load_result": (".runtime.model.result_loading", "load_result"),

@@ -12,8 +12,11 @@ from typing import Any
 import numpy as np
 
 import mstmm
-from mstmm.runtime.advice.beam_splitting import make_splittable, split_beams
-from mstmm.runtime.advice.body_model_levels import (
+from mstmm.runtime.experiments.error_measure import PositionMeasure
+from mstmm.runtime.experiments.method_families import PROMISING
+from mstmm.runtime.experiments.model_levels import Variant, model_levels, planar_level, with_tables
+from mstmm.runtime.experiments.model_reduction.beam_splitting import make_splittable, split_beams
+from mstmm.runtime.experiments.model_reduction.body_models import (
     LINEAR,
     ONE_WAY,
     RIGID,
@@ -21,11 +24,7 @@ from mstmm.runtime.advice.body_model_levels import (
     Bodies,
     BodyModel,
 )
-from mstmm.runtime.advice.measure_renaming import Renaming
-from mstmm.runtime.chart.error_measure import PositionMeasure
-from mstmm.runtime.chart.method_families import PROMISING
-from mstmm.runtime.chart.model_levels import Variant, model_levels, with_tables
-from mstmm.runtime.chart.planar_model import planar_level
+from mstmm.runtime.experiments.model_reduction.trial_models import Renaming
 from mstmm.runtime.result.flexible.modal_energy import modal_frequencies
 from mstmm.runtime.result.one_way.result import OneWayResult
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 import mstmm
+from mstmm.runtime.experiments.error_measure import Coordinates
 from mstmm.runtime.integrate.steppers import AUTO, get, names
-from mstmm.runtime.result.error_measure import Coordinates
 
 #: Relative tolerances, each with a hundredth of it as the absolute one.
 TOLERANCES = tuple(10.0**-k for k in range(2, 13))

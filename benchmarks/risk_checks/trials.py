@@ -11,8 +11,8 @@ import numpy as np
 
 import mstmm
 from mstmm.risk import Risk
+from mstmm.runtime.experiments.error_measure import Coordinates
 from mstmm.runtime.integrate.settings import Settings
-from mstmm.runtime.result.error_measure import Coordinates
 from mstmm.runtime.result.result import Result
 from mstmm.runtime.risk_checks.pre_run import check_before_run
 

@@ -12,8 +12,14 @@ from typing import Any
 import numpy as np
 
 from mstmm.errors import MstmmError
-from mstmm.runtime.chart.chart_points import Point, Reference, Setting
-from mstmm.runtime.chart.pareto_front import bound_errors, pareto_front, recommend
+from mstmm.runtime.experiments.chart.chart_record import (
+    Point,
+    Reference,
+    bound_errors,
+    pareto_front,
+    recommend,
+)
+from mstmm.runtime.experiments.trial import Setting
 
 from ..common import measure
 from ..stiff.cases import Case

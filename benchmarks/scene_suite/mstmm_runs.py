@@ -9,13 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 
 import mstmm
-from mstmm.runtime.chart.chart_points import Point, Reference, Setting, Skipped
-from mstmm.runtime.chart.error_measure import select_measure
-from mstmm.runtime.chart.method_families import FAMILIES, PROMISING, all_methods, family
-from mstmm.runtime.chart.method_survey import Survey, method_curve
-from mstmm.runtime.chart.reference_solution import compute_reference
-from mstmm.runtime.chart.time_budget import EARLY, SETTINGS, Budget
-from mstmm.runtime.chart.trial_run import Runs
+from mstmm.runtime.experiments.budget import EARLY, SETTINGS, Budget
+from mstmm.runtime.experiments.chart.chart_record import Point, Reference, Skipped
+from mstmm.runtime.experiments.chart.method_survey import Survey, method_curve
+from mstmm.runtime.experiments.error_measure import select_measure
+from mstmm.runtime.experiments.method_families import FAMILIES, PROMISING, all_methods, family
+from mstmm.runtime.experiments.reference import compute_reference
+from mstmm.runtime.experiments.runs import Runs
+from mstmm.runtime.experiments.trial import Setting
 
 from ..common import measure
 from ..stiff.cases import Case
@@ -80,16 +81,16 @@ def survey_case(
         if family(name) not in EXTERNAL_FAMILIES
         for engine, entry in models.items()
     ]
-    survey = Survey(reference_run.run, distance, runs, _ignore_message)
+    survey = Survey(reference_run.trial, distance, runs, _ignore_message)
     survey.run_curves([entry for entry in curves if entry.method in PROMISING], EARLY)
     survey_result = survey.run_curves(
         [entry for entry in curves if entry.method not in PROMISING], SETTINGS
     )
-    assert reference_run.run.numbers is not None
+    assert reference_run.trial.numbers is not None
     return OwnRuns(
         models,
         reference,
-        reference_run.run.numbers[-1],
+        reference_run.trial.numbers[-1],
         survey_result.points,
         survey_result.skipped,
     )

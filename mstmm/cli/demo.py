@@ -124,8 +124,8 @@ def _simulate(text: str) -> tuple[Result, float]:
     import tomllib
 
     import mstmm
-    from mstmm.runtime.model.execution import Execution
-    from mstmm.runtime.model.run_results import certify_result
+    from mstmm.runtime.experiments.run_request import Execution
+    from mstmm.runtime.experiments.run_results import certify_result
 
     model = mstmm.compile(mstmm.Scene(**tomllib.loads(text)))
     load_method("dop853")

@@ -32,8 +32,8 @@ from .progress import ProgressBar, progress_bar
 from .terminal_output import build_table, print_json, print_lines, print_note, table_console
 
 if TYPE_CHECKING:
-    from mstmm.runtime.advice.advice import Advice
-    from mstmm.runtime.chart.chart import Chart
+    from mstmm.runtime.experiments.chart.chart import Chart
+    from mstmm.runtime.experiments.model_reduction.advice import Advice
 
 #: Longest title of a plot, in characters.
 _MAX_TITLE_LENGTH = 60
@@ -168,7 +168,7 @@ def _print_table(
 
 
 def _print_chart(made: Chart, files: list[str]) -> None:
-    from mstmm.runtime.chart import tables
+    from mstmm.runtime.experiments.chart import tables
 
     print_lines(tables.recommendation(made))
     for title, table in (
@@ -209,7 +209,7 @@ def advise(
 
 
 def _print_advice(made: Advice, files: list[str]) -> None:
-    from mstmm.runtime.advice import tables
+    from mstmm.runtime.experiments.model_reduction import tables
 
     for line in tables.summary_lines(made):
         print_lines(line)

@@ -106,7 +106,7 @@ def view(
 def _load_result(what: str, t_end: float | None) -> Result:
     """Result to display: a saved one, a scene at its start, or a new run of a scene."""
     import mstmm
-    from mstmm.runtime.model.execution import Execution
+    from mstmm.runtime.experiments.run_request import Execution
     from mstmm.runtime.model.result_loading import load_netcdf
 
     if Path(what).suffix.lower() == ".nc":

@@ -33,7 +33,7 @@ from .options import (
 )
 
 if TYPE_CHECKING:
-    from mstmm.runtime.model.target_error.error_request import ErrorRequest
+    from mstmm.runtime.experiments.run_request import ErrorRequest
 
 #: Largest number of fixed steps of a run.
 MAX_STEPS = 1e11
@@ -154,7 +154,7 @@ class RunOptions:
     @property
     def target_error(self) -> ErrorRequest | None:
         """Target error with its quantities; None without one."""
-        from mstmm.runtime.model.target_error.error_request import ErrorRequest
+        from mstmm.runtime.experiments.run_request import ErrorRequest
 
         return None if self.error is None else ErrorRequest(self.error, tuple(self.of or ()))
 

@@ -20,7 +20,7 @@ from mstmm.errors import (
     RiskRefused,
     SceneError,
 )
-from mstmm.runtime.model.execution import Execution
+from mstmm.runtime.experiments.run_request import Execution
 
 from . import run_summary
 from .model_loading import compile_file, generate_elements, load_method
@@ -135,7 +135,7 @@ def _save_result(plan: RunOptions, result: Result, seconds: float, progress: Pro
         from mstmm.runtime.result.export import result_files
 
         result_files.save_result(result, plan.result_file)
-        from mstmm.runtime.model.run_results import certify_result
+        from mstmm.runtime.experiments.run_results import certify_result
 
         progress.label("estimating the error")
         result = certify_result(result, progress)

@@ -1,4 +1,4 @@
-"""Advice on the smallest sufficient model; compiles the models for `runtime.advice`."""
+"""Advice on the smallest sufficient model of a scene; compiles the models that are compared."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ..scene import Scene
 from .compilation import compile_level, compile_scene
 
 if TYPE_CHECKING:
-    from ..runtime.advice.advice import Advice
+    from ..runtime.experiments.model_reduction.advice import Advice
     from ..runtime.model.model import Model
 
 
@@ -52,8 +52,8 @@ def advise(
     Raises SceneError for invalid arguments, NumericalFailure for a scene that cannot be simulated,
     or whose motion cannot be determined to within the target error.
     """
-    from ..runtime.advice.advise import make_advice
-    from ..runtime.advice.request import advice_request
+    from ..runtime.experiments.model_reduction.advice_state import advice_request
+    from ..runtime.experiments.model_reduction.advise import make_advice
 
     request_options = advice_request(t_end, error, of, budget, samples, rounds)
 

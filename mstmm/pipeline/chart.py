@@ -1,4 +1,4 @@
-"""Work-precision chart of a scene; compiles its model levels for `runtime.chart`."""
+"""Work-precision chart of a scene; compiles its model levels."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ..scene import Scene
 from .compilation import compile_level, compile_scene
 
 if TYPE_CHECKING:
-    from ..runtime.chart.chart import Chart
+    from ..runtime.experiments.chart.chart import Chart
     from ..runtime.model.model import Model
 
 
@@ -64,7 +64,7 @@ def chart(
     Raises SceneError for invalid arguments, NumericalFailure if no reference is found within its
     part of the budget.
     """
-    from ..runtime.chart.build_chart import chart_request, make_chart
+    from ..runtime.experiments.chart.chart import chart_request, make_chart
 
     request_options = chart_request(
         t_end, quantities, methods, models, error, budget, samples, rounds

@@ -40,6 +40,15 @@ def _option(default: Any, metavar: str, description: str) -> Any:
 class Method:
     """Integration method by name, with limits of its steps.
 
+    Names: rk4 (with a fixed step), dopri5, dop853, pirk13 (order 13, for smooth motions on fused
+    code); auto, which is dop853 until stability sets its steps, then rodas4p2 (rtol from 1e-5 on)
+    or rodas5p, and back; for stiff motion rodas4p2, rodas5p, rodas4, ros34pw2, rodas4pw, esdirk436,
+    kvaerno5, genalpha, dttmm, hht, newmark, wilson or houbolt; genalpha-index3 and hht-index3,
+    which close loops by positions; exprb32 for undamped vibration of few unknowns; scipy-DOP853,
+    scipy-RK45, scipy-Radau, scipy-BDF, scipy-LSODA, sundials-BDF, sundials-Adams: integrators of
+    SciPy and SUNDIALS on the same kernels; dttmm-classical, dttmm-classical-product (with a fixed
+    step): the discrete-time transfer matrix method in absolute coordinates.
+
     Attributes:
         name: a name of `mstmm list methods`; "" for the automatic choice.
         max_step: longest step of an adaptive method, s; 0 for no limit.

@@ -10,32 +10,28 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mstmm.argument_validation import require_bool
-from mstmm.array_validation import Array, batch, finite_float, integer, single_state, split_state
+from mstmm.array_validation import Array, batch, finite_float, integer, single_state
 from mstmm.defaults import ATOL, METHOD, RTOL
 from mstmm.display import NotebookDisplay, PublicMembers, table
 from mstmm.errors import NumericalFailure
 from mstmm.risk import Risk
 
-from ..engine.inputs import InputValue
+from ..experiments.simulation import SimulatedScene
 from ..integrate.methods import Method, to_method
 from ..integrate.settings import Settings, to_output_times, validate
-from .execution import Execution, check_execution
 from .linear_analysis import LinearAnalysis
 
 if TYPE_CHECKING:
     from ..engine.loops.branches import Branch
     from ..engine.loops.loop_analysis import LoopAnalysis
     from ..result.batch_result import BatchResult
-    from ..result.result import Result
     from ..run.batch.batch_inputs import BatchInput
     from .assembly import Assembly
     from .equilibrium import Equilibrium
     from .session import Session
-    from .target_error.error_request import ErrorRequest
 
 
-class Model(LinearAnalysis, PublicMembers, NotebookDisplay):
+class Model(LinearAnalysis, SimulatedScene, PublicMembers, NotebookDisplay):
     """Compiled scene; created by `mstmm.compile`.
 
     `q` and `u` hold the hinges in the scene's order (`coordinate_layout`); SI units and radians;
@@ -74,18 +70,6 @@ class Model(LinearAnalysis, PublicMembers, NotebookDisplay):
             if self.loop_start is None
             else self.loop_start.loops.mobility
         )
-
-    def initial_state(self) -> tuple[Array, Array]:
-        """Initial state (q, u) of the scene at t = 0, with driven coordinates."""
-        q, u = self._initial_state
-        return q.copy(), u.copy()
-
-    @cached_property
-    def _initial_state(self) -> tuple[Array, Array]:
-        """Cached result of `initial_state`."""
-        from ..run.start_state import initial_state
-
-        return initial_state(self)
 
     @property
     def loops(self) -> LoopAnalysis:
@@ -216,91 +200,6 @@ class Model(LinearAnalysis, PublicMembers, NotebookDisplay):
         state = equilibrium(self, start, t, tolerance, step_limit, progress)
         linearise = partial(self.linearize, np.asarray(state), None, t, inputs=(), disturbances=())
         return with_persistence_findings(self, state, t, linearise)
-
-    def simulate(
-        self,
-        t_end: float,
-        method: str | Method | None = None,
-        step: float | None = None,
-        rtol: float | None = None,
-        atol: float | None = None,
-        output_times: ArrayLike | Sequence[float] | None = None,
-        *,
-        initial: tuple[ArrayLike, ArrayLike] | None = None,
-        inputs: Mapping[str, InputValue] | None = None,
-        error: float | ErrorRequest | None = None,
-        certify: bool = False,
-        t_start: float = 0.0,
-        execution: Execution | None = None,
-    ) -> Result:
-        """Simulate to `t_end` (s).
-
-        Args:
-            method: name of a method, or an object of `mstmm.methods` with options of its own.
-                rk4 (with `step`), dopri5, dop853, pirk13 (order 13, for smooth motions on fused
-                code); auto, which is dop853 until stability sets its steps, then rodas4p2 (rtol
-                from 1e-5 on) or rodas5p, and back; for stiff motion rodas4p2, rodas5p, rodas4,
-                ros34pw2, rodas4pw, esdirk436, kvaerno5, genalpha, dttmm, hht, newmark, wilson or
-                houbolt; genalpha-index3 and hht-index3, which close loops by positions; exprb32 for
-                undamped vibration of few unknowns; scipy-DOP853, scipy-RK45, scipy-Radau,
-                scipy-BDF, scipy-LSODA, sundials-BDF, sundials-Adams: integrators of SciPy and
-                SUNDIALS on the same kernels; dttmm-classical, dttmm-classical-product (with
-                `step`): the discrete-time transfer matrix method in absolute coordinates.
-                Without one auto, or dop853 where `step` is given; a run that has kept to dop853
-                is recorded as one by that method.
-            step: fixed step in s; otherwise `rtol` (1e-9) and `atol` (1e-12) control the step.
-            output_times: times of the samples (s, increasing), a lone whole number excepted;
-                otherwise every accepted step (with an error 201 samples).
-            initial: (q, u) instead of the initial state of the scene.
-            inputs: inputs of the scene in this run by name, as in `with_inputs`: numbers, names of
-                signals, (times, values), or the keys of a [[signal]].
-            error: target error of the whole run, instead of tolerances: in rad, and of other
-                coordinates relative to the largest excursion of their unit; of other quantities as
-                an `ErrorRequest`.  Several runs find the tolerance; `Result.achieved_error` is the
-                error.
-            certify: estimate the error by a second, more accurate run.
-            t_start: start time in s for drives, loads and signals.
-            execution: reaction to risks, progress calls, checkpoint and resumption.
-
-        Returns a Result, also after a failure: `success`, `message` and everything computed so far.
-        Raises SceneError for invalid settings, RiskRefused with on_risk = "refuse".
-        """
-        from ..risk_checks.risk_policy import apply_policy, check_start
-        from .run_results import simulate
-        from .target_error.error_request import Control, parse_error_request
-
-        run = check_execution(execution)
-        model = self if inputs is None else self.with_inputs(inputs)
-        certify, resume = require_bool("certify", certify), run.resume
-        chosen = None if method is None else to_method(method)
-        given = Control(None if chosen is None else chosen.name or None, step, rtol, atol)
-        request = parse_error_request(error, given, run.checkpoint is not None or resume)
-        name, rtol, atol = given.with_defaults()
-        settings = validate(
-            Settings(
-                t_end, t_start, name, step, rtol, atol, to_output_times(output_times),
-                **({} if chosen is None else chosen.options),
-            )
-        )  # fmt: skip
-        q, u = model.initial_state() if initial is None else split_state("initial", initial)
-        remedy = "simulate_batch takes many"
-        q, u = (
-            single_state("initial q", q, self.nq, remedy),
-            single_state("initial u", u, self.nu, remedy),
-        )
-        seen = check_start(model, settings, q, u, run.on_risk)
-        if request is not None:
-            from .target_error import tolerance_search
-
-            result = tolerance_search.simulate(
-                model, settings, request, q, u, seen=seen, certify=certify, progress=run.progress
-            )
-        else:
-            result = simulate(
-                model, settings, q, u, seen=seen, certify=certify, progress=run.progress,
-                checkpoint=run.checkpoint, resume=resume, named=given.method is not None,
-            )  # fmt: skip
-        return apply_policy(result, run.on_risk)
 
     def session(
         self,

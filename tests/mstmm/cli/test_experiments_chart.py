@@ -78,7 +78,7 @@ def test_bad_input(mstmm: Command, arguments: tuple[str, ...], words: str) -> No
 
 def test_without_matplotlib(mstmm: Command, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import mstmm.cli.options as command
-    from mstmm.runtime.chart import chart as charts
+    from mstmm.runtime.experiments.chart import chart as charts
 
     monkeypatch.setattr(command, "missing_packages", lambda _: ["matplotlib"])
     monkeypatch.setattr(charts, "has_matplotlib", lambda: False)

@@ -14,10 +14,10 @@ import pytest
 import mstmm
 from mstmm.errors import SceneError
 from mstmm.pipeline.compilation import compile_level
-from mstmm.runtime.advice.advice_summary import with_available_outputs
-from mstmm.runtime.advice.beam_splitting import split_beams
-from mstmm.runtime.chart.model_levels import with_model_level
 from mstmm.runtime.engine.quantity_registry import SUMS
+from mstmm.runtime.experiments.model_levels import with_model_level
+from mstmm.runtime.experiments.model_reduction.advice_summary import with_available_outputs
+from mstmm.runtime.experiments.model_reduction.beam_splitting import split_beams
 from mstmm.runtime.result.result import Result
 from mstmm.scene.checks.inputs import SCENE_QUANTITIES
 from tests.support.scenes.minimal import body

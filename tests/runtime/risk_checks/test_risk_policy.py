@@ -77,7 +77,7 @@ def test_a_run_is_refused_before_it_is_made(monkeypatch: pytest.MonkeyPatch) -> 
     def refuse_run(*_: Any) -> None:
         raise AssertionError("a run was made")
 
-    monkeypatch.setattr("mstmm.runtime.model.run_results.first_run", refuse_run)
+    monkeypatch.setattr("mstmm.runtime.experiments.run_results.first_run", refuse_run)
     with pytest.raises(mstmm.RiskRefused, match=r"before the run:\n  step-stability: step") as seen:
         model.simulate(1.0, method="rk4", step=0.05, execution=mstmm.Execution(on_risk="refuse"))
     (risk,) = seen.value.risks

@@ -27,8 +27,8 @@ from benchmarks.scene_suite.mstmm_runs import OwnRuns, survey_case
 from benchmarks.scene_suite.report import page
 from benchmarks.stiff.programs import Curve
 from mstmm.errors import MstmmError
-from mstmm.runtime.chart.chart_points import Point, Reference, Setting
-from mstmm.runtime.chart.pareto_front import bound_errors
+from mstmm.runtime.experiments.chart.chart_record import Point, Reference, bound_errors
+from mstmm.runtime.experiments.trial import Setting
 from tests.support.paths import ROOT
 
 FOLDER = ROOT / "benchmarks" / "scene_suite"

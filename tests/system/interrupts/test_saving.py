@@ -17,8 +17,8 @@ import pytest
 
 import mstmm as library
 from mstmm import errors
+from mstmm.runtime.experiments import run_results
 from mstmm.runtime.integrate.c_loop import Status
-from mstmm.runtime.model import run_results
 from mstmm.runtime.platform_support import interrupts
 from mstmm.runtime.platform_support.safe_files import replace_atomically
 from mstmm.runtime.result.export import csv_and_mat

@@ -70,7 +70,7 @@ def test_names_that_look_like_places_of_the_scene_do_no_harm(tmp_path: Path) -> 
 
 def test_advice_leaves_out_names_of_what_it_takes_away(tmp_path: Path) -> None:
     scene = mstmm.import_robot(write_robot_file(tmp_path, ARM), merge=False).scene
-    from mstmm.runtime.chart.model_levels import with_tables
+    from mstmm.runtime.experiments.model_levels import with_tables
 
     less = with_tables(scene, hinge=scene.hinge[:3], body=scene.body[:3])
     assert less.names.hinge == {"shoulder-1": "shoulder_1"}

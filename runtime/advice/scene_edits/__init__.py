@@ -1,1 +1,0 @@
-"""Edits of a scene: expand chains, merge welded bodies, rename references."""

@@ -1,0 +1,1 @@
+"""Runs of a scene, and experiments of many runs: error control, chart, model reduction."""

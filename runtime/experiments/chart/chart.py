@@ -1,0 +1,384 @@
+"""Work-precision chart of a scene with its plot, HTML page and JSON file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mstmm.array_validation import Array, finite_float, integer
+from mstmm.defaults import CHART_SAMPLES
+from mstmm.errors import EnvironmentFailure, MstmmError, SceneError
+
+from ...integrate.steppers import AUTO
+from ...platform_support.safe_files import write_text
+from ..budget import EARLY, REFERENCE, SETTINGS, Budget
+from ..error_measure import Measure, select_measure
+from ..method_families import PROMISING, require_methods, without_index3_duplicates
+from ..model_levels import Variant, model_levels, planar_level
+from ..reference import Converged, compute_reference
+from ..runs import Compile, Report, Runs, scene_warnings
+from ..trial import Setting, Trial, max_error
+from .chart_record import ChartRecord, Level, Reference, Skipped, bound_errors, split_warnings
+from .html_page import page
+from .matplotlib_plot import has_matplotlib, plot
+from .method_survey import Curve, Survey, method_curve, repeat_timings
+
+if TYPE_CHECKING:
+    from ..simulation import SimulatedScene
+
+
+@dataclass(frozen=True)
+class Chart(ChartRecord):
+    """Work-precision chart: CPU time against error of all methods.  Made by `mstmm.chart`.
+
+    The attributes are those of `ChartRecord`.
+    """
+
+    def plot(self, path: str | Path | None = None) -> Any:
+        """Plot as `matplotlib.figure.Figure`; needs the extra `plot`.
+
+        With `path` (.png, .svg, .pdf) also write the file.
+        """
+        return plot(self, None if path is None else Path(path))
+
+    def to_html(self) -> str:
+        """Self-contained HTML page: the plot, with details of a point on hover, and all tables."""
+        return page(self)
+
+    def save(self, folder: str | Path) -> tuple[Path, ...]:
+        """Write chart.html, chart.json and, where matplotlib is installed, chart.png.
+
+        Returns the paths of the files.  Raises EnvironmentFailure if the folder cannot be created
+        or written to.
+        """
+        directory = Path(folder)
+        try:
+            directory.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise EnvironmentFailure(
+                f'folder "{directory}": cannot be created: {error.strerror}'
+            ) from None
+        paths = []
+        for name, text in (("chart.html", self.to_html()), ("chart.json", self.to_json())):
+            write_text(directory / name, text)
+            paths.append(directory / name)
+        if has_matplotlib():
+            self.plot(directory / "chart.png")
+            paths.append(directory / "chart.png")
+        return tuple(paths)
+
+
+#: Relative tolerance of the runs with method "auto" that measure the errors of model levels.
+_LEVEL_RTOL = 1e-8
+#: Relative tolerance of the run whose steps show where the motion is fast.
+_STEP_SIZE_RTOL = 1e-6
+#: Coordinates that change by less than this (m, rad, or relative to their size) do not move.
+_MOTION_TOLERANCE = 1e-12
+#: Model levels with errors below this many times `_LEVEL_RTOL` use the setting of the reference.
+_ACCURATE_LEVEL_FACTOR = 1e3
+#: Fraction of the budget after which the errors of the model levels must be known.
+_LEVEL_BUDGET = 0.45
+#: Reason why there is only one model level.
+_NO_MODELS = (
+    "no model levels to compare: the scene has no flexible bodies, and no hinge that a planar "
+    "motion would simplify"
+)
+#: Name of the only level of a chart without model levels.
+AS_GIVEN = "as given"
+
+
+@dataclass(frozen=True)
+class ChartRequest:
+    """Validated arguments of `mstmm.chart`."""
+
+    t_end: float
+    quantities: tuple[str, ...]
+    methods: tuple[str, ...]
+    models: bool
+    error: float
+    budget: float
+    samples: int
+    fixed: bool
+    rounds: int
+
+
+def chart_request(
+    t_end: float, quantities: Sequence[str], methods: Sequence[str] | None, models: bool,
+    error: float, budget: float, samples: int | None, rounds: int,
+) -> ChartRequest:  # fmt: skip
+    """Validate the arguments of `mstmm.chart`; SceneError names the first invalid one."""
+    if isinstance(quantities, str) or isinstance(methods, str):
+        raise SceneError('quantities, methods: expected lists of names, as in ["tip.position"]')
+    return ChartRequest(
+        _require_positive("t_end", t_end, "a time in s"), tuple(quantities),
+        require_methods(methods), bool(models), _require_positive("error", error, "an error"),
+        _require_positive("budget", budget, "a time in s"),
+        integer(
+            "samples", CHART_SAMPLES if samples is None else samples, 2,
+            "a whole number of samples, 2 or more",
+        ),
+        samples is not None,
+        integer("rounds", rounds, 0, "a whole number of rounds, 0 or more"),
+    )  # fmt: skip
+
+
+def _require_positive(name: str, value: float, meaning: str) -> float:
+    number = finite_float(name, value, f"{meaning} above 0")
+    if not number > 0 or not math.isfinite(number):
+        raise SceneError(f"{name} = {number:g}: expected {meaning} above 0")
+    return number
+
+
+def make_chart(
+    model: SimulatedScene, request: ChartRequest, compile: Compile, title: str, report: Report,
+    report_status: Report, budget: Budget | None = None,
+) -> Chart:  # fmt: skip
+    """Build the work-precision chart of a model; `compile` makes the models of its other levels.
+
+    `report_status` is called with the time plan and the reference, `report` with a sentence before
+    every run.  Raises SceneError for an unknown quantity, NumericalFailure if no reference is
+    found.
+    """
+    return _ChartBuilder(
+        model, request, compile, report, report_status, budget or Budget(request.budget)
+    ).chart(title)
+
+
+class _ChartBuilder:
+    """Intermediate results of a chart: times, runs, model levels, skipped runs."""
+
+    def __init__(
+        self, model: SimulatedScene, request: ChartRequest, compile: Compile, report: Report,
+        report_status: Report, budget: Budget,
+    ) -> None:  # fmt: skip
+        if model.loop_start is None:
+            request = replace(request, methods=without_index3_duplicates(request.methods))
+        self.model, self.request, self.compile = model, request, compile
+        self.report, self.report_status, self.budget = report, report_status, budget
+        self.times = equidistant_times(request.t_end, request.samples)
+        self.runs = Runs(request.t_end, self.times.times, budget)
+        self.skipped: list[Skipped] = []
+        self.model_levels: list[Level] = []
+
+    def chart(self, title: str) -> Chart:
+        request = self.request
+        variants = model_levels(self.model.scene) if request.models else ()
+        richest = self._richest_model(variants)
+        start = richest.simulate(0.0, method="dop853")
+        measure = select_measure(richest, start, request.quantities, request.models)
+        self.report_status(self.budget.plan(len(request.methods) * max(1, len(variants))))
+        name = variants[-1].name if variants else AS_GIVEN
+        if not request.fixed:
+            self._refine_times(richest, name)
+        best = compute_reference(richest, name, measure, self.runs, self.report)
+        reference = Reference(
+            best.error, best.made_by, name, measure.name, measure.unit, measure.scaling,
+            best.trial.ended, _is_static(best.trial.trajectory.q),
+        )  # fmt: skip
+        self._report_reference(reference)
+        curves = self._curves(variants, richest, best, measure, reference)
+        if reference.is_static:
+            curves = []
+        survey = Survey(best.trial, measure, self.runs, self.report)
+        survey.run_curves([curve for curve in curves if curve.method in PROMISING], EARLY)
+        surveyed = survey.run_curves(
+            [curve for curve in curves if curve.method not in PROMISING], SETTINGS
+        )
+        points, missed = repeat_timings(
+            surveyed.points, surveyed.models, request.rounds, self.runs, self.report
+        )
+        if missed and request.rounds:
+            reason = (
+                f"{missed} of {len(points)} runs were timed less often than the others, for lack "
+                "of time"
+            )
+            self.skipped.append(Skipped("", "", "", reason, False))
+        level_errors = {
+            level.name: level.error
+            for level in self.model_levels
+            if level.error is not None and level.name != reference.model
+        }
+        points_with_bounds, common_warnings = split_warnings(
+            bound_errors(points, reference, level_errors)
+        )
+        return Chart(
+            title, request.t_end, len(self.times.times), reference, points_with_bounds,
+            tuple(self.model_levels), (*self.skipped, *surveyed.skipped), request.error,
+            request.budget, self.budget.elapsed_time, self.times.description,
+            (*scene_warnings(richest.scene), *common_warnings),
+        )  # fmt: skip
+
+    def _refine_times(self, richest: SimulatedScene, name: str) -> None:
+        """Add times where the motion is fast, unless the run for that takes too long."""
+        self.report("run to choose the times of the error")
+        setting = Setting(AUTO, name, _STEP_SIZE_RTOL)
+        limit = self.budget.run_limit(REFERENCE)
+        result, _ = self.runs.try_simulate(richest, setting.options, limit, own_steps=True)
+        if result is None or not result.is_comparable or not len(result.t):
+            return
+        steps = result.t
+        self.times = refine_times(equidistant_times(steps[-1], self.request.samples), steps)
+        self.runs.times = self.times.times
+
+    def _report_reference(self, reference: Reference) -> None:
+        """Report the reference, and the times at which errors are evaluated."""
+        self.report_status(
+            f"reference: {reference.made_by}; its own error is {reference.error:.1e}"
+        )
+        self.report_status(f"errors are evaluated at {self.times.description}")
+        if reference.stop_event:
+            self.report_status(f"runs end before {self.request.t_end:g} s: {reference.stop_event}")
+        if reference.is_static:
+            self.report_status("the scene has no degrees of freedom: no methods are compared")
+
+    def _richest_model(self, variants: Sequence[Variant]) -> SimulatedScene:
+        """Model of the richest level; compiled like the other levels if there are any."""
+        return self.compile(variants[-1].scene) if variants else self.model
+
+    def _curves(
+        self,
+        variants: Sequence[Variant],
+        richest: SimulatedScene,
+        best: Converged,
+        measure: Measure,
+        reference: Reference,
+    ) -> list[Curve]:
+        """Curves of all methods on all model levels, the richest level last."""
+        models: list[tuple[str, SimulatedScene, float | None]] = []
+        others = list(variants[:-1])
+        if (
+            variants
+            and (planar := planar_level(variants[-1], richest, best.trial.trajectory.q)) is not None
+        ):
+            others.append(planar)
+        for variant in others:
+            evaluated = self._evaluate_level(variant, best, measure)
+            if evaluated is not None:
+                models.append((variant.name, *evaluated))
+        if self.request.models and not others:
+            self.skipped.append(Skipped("", "", "", _NO_MODELS, True))
+        models.append((reference.model, richest, None))
+        self.model_levels.append(
+            Level(reference.model, reference.error, _degrees_of_freedom(richest), richest.engine)
+        )
+        return [
+            method_curve(
+                method,
+                level,
+                model,
+                self.request.t_end,
+                reference.smallest_resolved_error,
+                level_error,
+            )
+            for method in self.request.methods
+            for level, model, level_error in models
+        ]
+
+    def _evaluate_level(
+        self, variant: Variant, best: Converged, measure: Measure
+    ) -> tuple[SimulatedScene, float | None] | None:
+        """Model of a level and its error (None if unknown); None if the level does not apply.
+
+        The reason is added to the skipped runs.
+        """
+        self.report(f"model level {variant.name}")
+        try:
+            model = self.compile(variant.scene)
+            run = self._run_accurately(model, variant.name, best, measure)
+        except MstmmError as problem:
+            self.skipped.append(Skipped("", variant.name, "", str(problem), True))
+            return None
+        if run.numbers is None and not run.late:
+            self.skipped.append(Skipped("", variant.name, "", run.failure, True))
+            return None
+        error, reason = math.inf, "the run took too long"
+        if not run.late:
+            error, reason = max_error(run, best.trial, measure)
+        if reason:
+            reason = f"error of the model level unknown: {reason}"
+            self.skipped.append(Skipped("", variant.name, "", reason, False))
+        level_error = None if reason else error
+        self.model_levels.append(
+            Level(variant.name, level_error, _degrees_of_freedom(model), model.engine)
+        )
+        return model, level_error
+
+    def _run_accurately(
+        self, model: SimulatedScene, level: str, best: Converged, measure: Measure
+    ) -> Trial:
+        """Run of a level whose integration error is small compared with the error of the level.
+
+        An accurate level needs the setting of the reference for that.
+        """
+        limit = self.budget.run_limit(_LEVEL_BUDGET)
+        run = self.runs.trial(model, Setting(AUTO, level, _LEVEL_RTOL), measure, limit)
+        if run.numbers is None:
+            return run
+        error, reason = max_error(run, best.trial, measure)
+        if reason or error > _ACCURATE_LEVEL_FACTOR * _LEVEL_RTOL:
+            return run
+        tight = replace(best.trial.setting, model=level)
+        tighter = self.runs.trial(model, tight, measure, limit)
+        return run if tighter.numbers is None else tighter
+
+
+def _degrees_of_freedom(model: SimulatedScene) -> int:
+    """Number of degrees of freedom; of a mechanism, its mobility."""
+    return model.nu if model.loop_start is None else model.loop_start.loops.mobility
+
+
+def _is_static(q: Array) -> bool:
+    """Whether no coordinate moves; q is (n, nq)."""
+    return bool(
+        (q.max(axis=0) - q.min(axis=0) <= _MOTION_TOLERANCE * np.maximum(1.0, abs(q[0]))).all()
+    )
+
+
+#: Largest number of times, relative to the equidistant ones.
+_MAX_COUNT_FACTOR = 4
+
+#: Steps between two equidistant times that indicate fast motion; every run begins with two or three
+#: short steps, which do not.
+_FAST_STEP_COUNT = 4
+
+#: Times closer together than this fraction of the run are merged.
+_MERGE_FRACTION = 1e-12
+
+
+@dataclass(frozen=True)
+class Times:
+    """Times of samples (n,), s, and a description of their distribution."""
+
+    times: Array
+    description: str
+
+
+def equidistant_times(t_end: float, count: int) -> Times:
+    """Equidistant times from 0 to t_end, s."""
+    return Times(np.linspace(0.0, t_end, count), f"{count} equidistant times up to {t_end:.6g} s")
+
+
+def refine_times(times: Times, steps: Array) -> Times:
+    """Add the ends of steps (m,), s, to the intervals that contain several of them.
+
+    Additional times beyond the largest number allowed are thinned out evenly.
+    """
+    first, last = times.times[0], times.times[-1]
+    min_distance = _MERGE_FRACTION * (last - first)
+    inside = steps[(steps > first) & (steps < last)]
+    interval = np.searchsorted(times.times, inside) - 1
+    is_fast = np.bincount(interval, minlength=len(times.times)) >= _FAST_STEP_COUNT
+    distances = np.minimum(inside - times.times[interval], times.times[interval + 1] - inside)
+    added = np.unique(inside[is_fast[interval] & (distances > min_distance)])
+    max_count = (_MAX_COUNT_FACTOR - 1) * len(times.times)
+    if len(added) > max_count:
+        added = added[np.linspace(0, len(added) - 1, max_count).round().astype(int)]
+    if not len(added):
+        return times
+    words = f"{times.description}, and {len(added)} more where the motion is fast"
+    return Times(np.union1d(times.times, added), words)

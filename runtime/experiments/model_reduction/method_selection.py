@@ -1,0 +1,183 @@
+"""Select method and tolerance: the cheapest setting that meets a target error."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.errors import NumericalFailure
+
+from ...integrate.steppers import AUTO
+from ..budget import ALL, EARLY, Budget
+from ..chart.chart_record import Point, Reference, bound_errors, recommend
+from ..chart.method_survey import Curve, Survey, method_curve, repeat_timings
+from ..method_families import PROMISING
+from ..run_request import ErrorRequest
+from ..runs import Runs
+from ..trial import Setting, max_error
+from .scene_edits import rename_reference
+from .trial_models import TrialResult, TrialRunner
+
+if TYPE_CHECKING:
+    from .advice_state import AdviceState
+
+
+#: Target error of the integration as a fraction of the error that the model leaves; and fraction of
+#: the target error below which tighter settings are not tried.
+_INTEGRATION_ERROR, _SUFFICIENT_ERROR = 0.5, 0.3
+
+#: Number of settings whose timing is repeated; models count as equally fast up to this ratio of CPU
+#: times, because timings scatter.
+_REPEATED, _EQUAL_TIME_RATIO = 8, 1.15
+
+
+@dataclass(frozen=True)
+class SelectedSetting:
+    """Setting of a model, with its error and CPU time in `point`.
+
+    They refer to the compared time span; with `covers_whole_run` the integration was checked over
+    the whole run.
+    """
+
+    trial: TrialResult
+    point: Point
+    covers_whole_run: bool = False
+
+
+def cheapest_setting(
+    finalists: list[TrialResult],
+    bench: TrialRunner,
+    target_error: float,
+    of: tuple[str, ...],
+    rounds: int,
+    seconds: float,
+) -> SelectedSetting:
+    """Cheapest setting of any of these models with an error of at most `target_error`.
+
+    The first model is the smallest.  `seconds` limits the wall-clock time.  Raises NumericalFailure
+    if no setting reaches the error.
+    """
+    budget = Budget(seconds, bench.budget.clock)
+    runs = Runs(bench.span.t_end, np.array(bench.runs.times), budget)
+    survey = Survey(bench.reference, bench.measure, runs, bench.report)
+    reference = Reference(0.0, "", "", bench.measure.name, bench.measure.unit, "")
+    model_errors = {tried.name: tried.error / bench.span.growth for tried in finalists}
+    curves = []
+    for tried in finalists:
+        model, enough = tried.compiled_model, _SUFFICIENT_ERROR * target_error
+        names = bench.measure.names_of(model)
+        quantities = tuple(rename_reference(name, names) for name in of)
+        model_error = model_errors[tried.name]
+        setting = _setting_for_error(
+            tried, runs, quantities, _INTEGRATION_ERROR * (target_error - model_error)
+        )
+        if setting is not None:
+            curves.append(Curve(setting.method, tried.name, model, enough, "", iter((setting,))))
+        curves += [
+            method_curve(method, tried.name, model, bench.span.t_end, enough, model_error)
+            for method in PROMISING
+        ]
+    surveyed = survey.run_curves(curves, EARLY)
+    points = bound_errors(surveyed.points, reference)
+    sufficient = [
+        i
+        for i, point in enumerate(points)
+        if point.error_bound is not None and point.error_bound <= target_error
+    ]
+    if not sufficient:
+        raise NumericalFailure(f"no setting reaches an error of {target_error:.1e}")
+    smallest_name = finalists[0].name
+    order = sorted(sufficient, key=lambda i: points[i].cpu_s or 0.0)
+    fastest, others = order[:_REPEATED], order[_REPEATED:]
+    repeated = [*fastest, *(i for i in others if points[i].model == smallest_name)]
+    repeated = repeated[: 2 * _REPEATED]
+    models = [surveyed.models[i] for i in repeated]
+    timed, _ = repeat_timings([points[i] for i in repeated], models, rounds, runs, bench.report)
+    best = recommend(timed, target_error, reference)
+    of_smallest = [point for point in timed if point.model == smallest_name]
+    if of_smallest:  # prefer the smallest model unless it is slower
+        smallest = recommend(of_smallest, target_error, reference)
+        if (smallest.cpu_s or 0.0) <= _EQUAL_TIME_RATIO * (best.cpu_s or 0.0):
+            best = smallest
+    return SelectedSetting(next(tried for tried in finalists if tried.name == best.model), best)
+
+
+def _setting_for_error(
+    tried: TrialResult, runs: Runs, of: tuple[str, ...], error: float
+) -> Setting | None:
+    """Setting that `simulate` selects for an integration error; None if it fails."""
+    options, limit = {"error": ErrorRequest(error, of)}, runs.budget.run_limit(ALL)
+    result, _ = runs.try_simulate(tried.compiled_model, options, limit)
+    estimate = None if result is None else result.achieved_error
+    if result is None or estimate is None or not result.is_comparable:
+        return None
+    return Setting(estimate.method, tried.name, estimate.rtol)
+
+
+def compare_cpu_times(
+    a: TrialResult,
+    setting: Setting,
+    b: TrialResult,
+    other: Setting,
+    bench: TrialRunner,
+    rounds: int,
+) -> tuple[float, float] | None:
+    """CPU times of two runs in alternating rounds, s; None if one fails or takes too long."""
+    points, models = [], [a.compiled_model, b.compiled_model]
+    for model, model_setting in zip(models, (setting, other), strict=True):
+        trial = bench.runs.trial(model, model_setting, bench.measure, bench.budget.remaining() / 2)
+        if trial.numbers is None:
+            return None
+        points.append(Point(model_setting, 0.0, trial.cpu_s, 1))
+    timed, _ = repeat_timings(points, models, rounds, bench.runs, bench.report)
+    first, second = (point.cpu_s or 0.0 for point in timed)
+    return first, second
+
+
+#: Smallest fraction of the budget for this search, whatever remains of the budget.
+_MIN_BUDGET = 0.3
+
+#: First tolerance relative to the relative target error, and tightest tolerance; ratio of the
+#: tolerance of the verification; error that the next tolerance aims at, as a fraction of the
+#: allowed error; largest number of tolerances.
+_FIRST, _TIGHTEST, _VERIFICATION_RATIO, _TARGET_FRACTION, _MAX_TRIALS = 0.1, 1e-12, 1e-2, 0.3, 6
+
+
+def whole_run_tolerance(
+    best: TrialResult, state: AdviceState, allowed_error: float
+) -> SelectedSetting | None:
+    """Tolerance of method "auto" whose error over the whole run is at most `allowed_error`.
+
+    None if none is found in time.
+    """
+    span, measure = state.runner.span, state.measure
+    budget = Budget(
+        max(_MIN_BUDGET * state.request.budget, state.budget.remaining()), state.budget.clock
+    )
+    times = np.linspace(0.0, span.whole_t_end, state.request.samples)
+    runs = Runs(span.whole_t_end, times, budget)
+    rtol = min(max(_FIRST * state.relative_target, _TIGHTEST / _VERIFICATION_RATIO), 1e-3)
+    for _ in range(_MAX_TRIALS):
+        setting = Setting(AUTO, best.name, rtol)
+        tighter = Setting(AUTO, best.name, rtol * _VERIFICATION_RATIO)
+        trial = runs.trial(best.compiled_model, setting, measure, budget.remaining() / 3)
+        verification = runs.trial(best.compiled_model, tighter, measure, budget.remaining() / 2)
+        if trial.numbers is None or verification.numbers is None:
+            return None
+        error, reason = max_error(trial, verification, measure)
+        if reason:
+            return None
+        if error <= allowed_error:
+            total_error = (best.error + error) / span.growth
+            return SelectedSetting(
+                best, Point(setting, total_error, trial.cpu_s, 1), covers_whole_run=True
+            )
+        if rtol <= _TIGHTEST / _VERIFICATION_RATIO:
+            return None
+        rtol = max(
+            rtol * min(max(_TARGET_FRACTION * allowed_error / error, 1e-4), 0.1),
+            _TIGHTEST / _VERIFICATION_RATIO,
+        )
+    return None

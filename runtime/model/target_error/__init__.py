@@ -1,1 +1,0 @@
-"""A wanted error: what may be asked for, and the runs that reach it."""
