@@ -14,7 +14,7 @@ from .run_summary import count_text
 from .terminal_output import build_table, print_error, print_json, print_lines, table_console
 
 if TYPE_CHECKING:
-    from mstmm.runtime.libraries.cache_maintenance import ListedEntry
+    from mstmm.runtime.libraries.cache import ListedEntry
 
 ACTIONS = ("list", "verify", "clean")
 
@@ -39,7 +39,7 @@ def cache(
         raise typer.BadParameter(f"{quote(action)}: expected {', '.join(ACTIONS)}")
     if unused and action != "clean":
         raise typer.BadParameter("--unused requires clean")
-    from mstmm.runtime.libraries.cache_folder import private_folder
+    from mstmm.runtime.libraries.cache_files import private_folder
 
     folder = private_folder()
     if action == "clean":
@@ -49,8 +49,8 @@ def cache(
 
 
 def _list_entries(folder: Path, json: bool, verify: bool) -> None:
-    from mstmm.runtime.libraries.cache_folder import size_limit
-    from mstmm.runtime.libraries.cache_maintenance import count_unfinished_builds, list_entries
+    from mstmm.runtime.libraries.cache import count_unfinished_builds, list_entries
+    from mstmm.runtime.libraries.cache_files import size_limit
 
     entries, unfinished_count = list_entries(folder), count_unfinished_builds(folder)
     damaged = [entry for entry in entries if entry.problem]
@@ -87,7 +87,7 @@ def _print_summary(
 
 
 def _delete_entries(folder: Path, unused: float, json: bool) -> None:
-    from mstmm.runtime.libraries.cache_maintenance import clean_cache
+    from mstmm.runtime.libraries.cache import clean_cache
 
     removed, size = clean_cache(folder, unused * _DAY)
     if json:

@@ -109,9 +109,9 @@ def _check_versions() -> Iterator[Diagnosis]:
 
 
 def _check_processor() -> Iterator[Diagnosis]:
-    from mstmm.runtime.libraries import cpu_features
+    from mstmm.runtime.libraries.toolchain import processor_features
 
-    features = cpu_features.features()
+    features = processor_features()
     flags = set((features.get("flags") or features.get("Features") or "").split())
     vector_extensions = [
         name for name in ("avx512f", "avx2", "fma", "asimd", "sve") if name in flags
@@ -141,11 +141,11 @@ def _check_compiler(flags: Sequence[str]) -> Iterator[Diagnosis]:
 
 
 def _check_cache() -> Iterator[Diagnosis]:
-    from mstmm.runtime.libraries import cache_folder
-    from mstmm.runtime.libraries import cache_maintenance as cache_upkeep
+    from mstmm.runtime.libraries import cache_files
+    from mstmm.runtime.libraries.cache import list_entries
 
     try:
-        cache_path, size_limit = cache_folder.private_folder(), cache_folder.size_limit()
+        cache_path, size_limit = cache_files.private_folder(), cache_files.size_limit()
         with tempfile.TemporaryFile(dir=cache_path) as file:
             file.write(b"\0" * 4096)
     except EnvironmentFailure as error:
@@ -156,9 +156,9 @@ def _check_cache() -> Iterator[Diagnosis]:
             f"{cache_path} is not writable ({error.strerror}); free disk space or change "
             f"permissions"
         )
-        yield Diagnosis("cache", False, f"{text}, or set {cache_folder.VARIABLE}")
+        yield Diagnosis("cache", False, f"{text}, or set {cache_files.VARIABLE}")
         return
-    entries = cache_upkeep.list_entries(cache_path)
+    entries = list_entries(cache_path)
     size, free = sum(entry.bytes for entry in entries), shutil.disk_usage(cache_path).free
     mode = stat.S_IMODE(cache_path.stat().st_mode)
     data = {

@@ -29,8 +29,13 @@ from mstmm.scene import Scene
 from mstmm.scene.checks.user_types import used_types
 
 from ..libraries.build_extension import COMPILE_ARGS
-from ..libraries.cache_entry import DESCRIPTION_FILE, DamagedEntryError, read_private
-from ..libraries.cache_folder import folder_problem, parent_problem
+from ..libraries.cache_files import (
+    DESCRIPTION_FILE,
+    DamagedEntryError,
+    folder_problem,
+    parent_problem,
+    read_private,
+)
 from ..libraries.library_build import BuildOrder, BuiltLibrary, find_library, get_or_build, remove
 from ..libraries.toolchain import time_limit
 from ..platform_support.safe_files import write_text

@@ -8,11 +8,13 @@ used entries are removed.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import os
 import sys
-from collections.abc import Callable, Mapping
+import time
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
@@ -21,10 +23,28 @@ from mstmm import version
 from mstmm.abi.element_library import ABI_VERSION
 from mstmm.errors import EnvironmentFailure
 
-from . import cpu_features, toolchain
-from .cache_entry import FORMAT, DamagedEntryError
-from .cache_folder import VARIABLE, private_folder, size_limit
-from .library_build import BuildOrder, BuiltLibrary, find_library, get_or_build, remove
+from ..platform_support.file_lock import lock_if_free
+from . import toolchain
+from .cache_files import (
+    DESCRIPTION_FILE,
+    FORMAT,
+    VARIABLE,
+    DamagedEntryError,
+    private_folder,
+    read_entry,
+    size_limit,
+)
+from .library_build import (
+    LOCK_SUFFIX,
+    UNFINISHED_PREFIX,
+    BuildOrder,
+    BuiltLibrary,
+    find_library,
+    get_or_build,
+    remove,
+    remove_leftovers,
+    tree_size,
+)
 
 __all__ = ["BuiltLibrary", "Recipe", "find", "library", "open_cached_library"]
 
@@ -80,8 +100,6 @@ def library(recipe: Recipe, *, timeout: float | None = None) -> BuiltLibrary:
     place, order = _place_and_order(recipe)
     built = get_or_build(place, order, toolchain.time_limit() if timeout is None else timeout)
     if built.how == "compiled":
-        from .cache_maintenance import limit_cache
-
         limit_cache(place.parent, keep=place)
     return built
 
@@ -121,7 +139,7 @@ def _place_and_order(recipe: Recipe) -> tuple[Path, BuildOrder]:
         "flags": list(recipe.flags),
         "optional": list(recipe.optional),
         "compiler": toolchain.find_compiler().identity(),
-        "processor": cpu_features.features(),
+        "processor": toolchain.processor_features(),
         "platform": f"{sys.platform} {os.uname().machine} {sys.byteorder} {sys.maxsize}",
         "mstmm": version.__version__,
         "abi": f"{FORMAT} {ABI_VERSION}",
@@ -134,3 +152,96 @@ def _place_and_order(recipe: Recipe) -> tuple[Path, BuildOrder]:
         recipe.optional,
     )  # fmt: skip
     return private_folder() / f"{recipe.name}-{key[:32]}", order
+
+
+# --- maintenance: list, verify and remove entries -------------------------------------------------
+
+#: Entries used within this time, s, are kept: a process may be about to load them.
+_MIN_UNUSED_TIME = 60.0
+
+
+@dataclass(frozen=True)
+class ListedEntry:
+    """Listed entry: size in bytes, time of last use in s since 1970, problem or ""."""
+
+    folder: Path
+    bytes: int
+    used: float
+    problem: str
+    about: dict[str, object]
+
+
+def _entry_folders(parent: Path) -> Iterator[Path]:
+    with contextlib.suppress(OSError):
+        for place in os.scandir(parent):
+            if not place.name.startswith(".") and place.is_dir(follow_symlinks=False):
+                yield Path(place.path)
+
+
+def list_entries(parent: Path) -> list[ListedEntry]:
+    """List all entries, the most recently used first, and verify each by its checksum."""
+    rows = []
+    for folder in _entry_folders(parent):
+        problem, description = "", {}
+        try:
+            entry = read_entry(folder)
+            if entry is None:
+                continue
+            description = entry.about
+            if not folder.name.endswith(str(description["key"])[:32]):
+                problem = "its folder is named after another key"
+        except DamagedEntryError as damage:
+            problem = str(damage)
+        rows.append(
+            ListedEntry(folder, tree_size(folder), _last_used(folder), problem, description)
+        )
+    return sorted(rows, key=lambda one: -one.used)
+
+
+def _last_used(folder: Path) -> float:
+    for path in (folder / DESCRIPTION_FILE, folder):
+        with contextlib.suppress(OSError):
+            return path.stat().st_mtime
+    return 0.0
+
+
+def count_unfinished_builds(parent: Path) -> int:
+    """Number of builds in progress, or interrupted and not yet removed."""
+    return sum(1 for _ in parent.glob(f"{UNFINISHED_PREFIX}*"))
+
+
+def limit_cache(parent: Path, keep: Path) -> None:
+    """Remove leftovers of killed processes, and the least recently used entries above the limit.
+
+    `keep` is the new entry, which is never removed.  Never raises OSError.
+    """
+    remove_leftovers(parent)
+    max_size = size_limit()
+    sizes = {place: (_last_used(place), tree_size(place)) for place in _entry_folders(parent)}
+    total = sum(size for _, size in sizes.values())
+    for place, (last_used, size) in sorted(sizes.items(), key=lambda one: one[1]):
+        if total <= max_size:
+            break
+        if place != keep and time.time() - last_used > _MIN_UNUSED_TIME:
+            remove(place)
+            total -= size
+
+
+def clean_cache(parent: Path, unused: float = 0.0) -> tuple[int, int]:
+    """Remove entries not used for `unused` s, leftovers and idle locks.
+
+    Returns the number of removed entries and their bytes.  Builds of other processes are kept, and
+    libraries that they have loaded remain usable.
+    """
+    count = size = 0
+    now = time.time()
+    for place in list(_entry_folders(parent)):
+        if now - _last_used(place) >= unused:
+            size += remove(place)
+            count += 1
+    remove_leftovers(parent, age=0.0)
+    for path in parent.glob(f".*{LOCK_SUFFIX}"):
+        with lock_if_free(path) as is_idle:
+            if is_idle:
+                path.unlink(missing_ok=True)
+    return count, size

@@ -10,17 +10,17 @@ import contextlib
 import errno
 import os
 import shutil
+import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from mstmm.errors import EnvironmentFailure
 
-from . import cache_entry as entries
 from . import toolchain
-from .cache_entry import DamagedEntryError, Entry
+from .cache_files import DamagedEntryError, Entry, mark_used, read_entry, store_text, write_entry
 from .toolchain import Compiler
 
 #: Prefix of folders in which a library is being built.
@@ -77,10 +77,10 @@ class BuiltLibrary:
 
 def find_library(place: Path, key: str) -> BuiltLibrary | None:
     """Find the library at `place`, None if there is none.  Raises Damaged if its check fails."""
-    entry = entries.read(place, key)
+    entry = read_entry(place, key)
     if entry is None:
         return None
-    entries.mark_used(entry)
+    mark_used(entry)
     return _built_library(entry, "cached", "")
 
 
@@ -161,8 +161,6 @@ def _build_folder(parent: Path) -> Iterator[Path]:
 
 def _build_entry(folder: Path, order: BuildOrder, compiler: Compiler, timeout: float) -> Entry:
     """Write, compile and test a library and write its description, all inside `folder`."""
-    from . import self_test
-
     work_folder = folder.parent / "work"
     work_folder.mkdir()
     texts = order.sources(order.key)
@@ -174,7 +172,7 @@ def _build_entry(folder: Path, order: BuildOrder, compiler: Compiler, timeout: f
         compiler, sources, folder / library, order.flags, order.optional, timeout
     )
     (folder / library).chmod(0o700)
-    problem_text = self_test.problem(folder / library, order.symbols)
+    problem_text = _library_problem(folder / library, order.symbols)
     if problem_text:
         remedy = (
             f"set {order.variable} to another folder"
@@ -185,14 +183,14 @@ def _build_entry(folder: Path, order: BuildOrder, compiler: Compiler, timeout: f
             f"the library that the C compiler {compiler.command[0]} built from {sources[0].name} "
             f"cannot be used: {problem_text}; {remedy}"
         )
-    entries.store_text(folder, texts)
+    store_text(folder, texts)
     description = {
         **order.about, "name": order.name, "key": order.key, "flags": list(compilation.flags),
         "seconds": round(compilation.seconds, 4), "compiler": compiler.identity(),
         "compiler_version": toolchain.compiler_version(compiler, work_folder),
         "created": time.strftime("%Y-%m-%dT%H:%M:%S%z"),
     }  # fmt: skip
-    return entries.write(folder, library, description)
+    return write_entry(folder, library, description)
 
 
 def _move_entry(entry: Entry, place: Path) -> Entry:
@@ -206,7 +204,7 @@ def _move_entry(entry: Entry, place: Path) -> Entry:
                 raise
         # Another process without the lock was faster, or a damaged entry is there.
         with contextlib.suppress(DamagedEntryError):
-            existing_entry = entries.read(place, str(entry.about["key"]))
+            existing_entry = read_entry(place, str(entry.about["key"]))
             if existing_entry is not None:
                 return existing_entry
         with contextlib.suppress(FileNotFoundError):
@@ -265,3 +263,48 @@ def tree_size(folder: Path) -> int:
             with contextlib.suppress(OSError):
                 total += os.lstat(os.path.join(place, name)).st_size
     return total
+
+
+# --- test in a separate process, so that a crash does not end this one ----------------------------
+#
+# The process returns 0 if the library opens, has its symbols, and its self-test, if any, returns 0.
+
+#: Name of the self-test `int (void)` that a library may export; 0 is success.
+_SELF_TEST_SYMBOL = "mstmm_self_test"
+
+_SELF_TEST_TIMEOUT_S = 60.0
+
+# Without site and with the standard library alone: about 12 ms.
+_SELF_TEST_SCRIPT = f"""\
+import ctypes, os, sys
+library = ctypes.CDLL(sys.argv[1], os.RTLD_NOW)
+for name in sys.argv[2:]:
+    getattr(library, name)
+test = getattr(library, {_SELF_TEST_SYMBOL!r}, None)
+if test is not None and test() != 0:
+    sys.exit("its self-test failed")
+"""
+
+
+def _library_problem(library: Path, symbols: Sequence[str]) -> str:
+    """Reason that a library cannot be used, or ""; also "" if no test process can be started."""
+    from ..platform_support.subprocesses import ProcessTimeout, run
+
+    if not sys.executable:  # Python inside another program
+        return ""
+    try:
+        result = run(
+            [sys.executable, "-I", "-S", "-c", _SELF_TEST_SCRIPT, str(library), *symbols],
+            library.parent,
+            _SELF_TEST_TIMEOUT_S,
+        )
+    except ProcessTimeout:
+        return f"it did not return within {_SELF_TEST_TIMEOUT_S:g} s"
+    except OSError:
+        return ""
+    if result.code == 0:
+        return ""
+    if result.code < 0:
+        return f"it crashes ({result.signal()})"
+    lines = result.output.splitlines()
+    return lines[-1].strip()[:300] if lines else f"its test ended with code {result.code}"

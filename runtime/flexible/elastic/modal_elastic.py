@@ -21,7 +21,7 @@ from mstmm.scene.checks.topology import inboard_hinges_by_body
 from mstmm.scene.tables.hinge_frames import initial_motion_axes
 from mstmm.scene.validators.scalars_and_vectors import GROUND, split_reference
 
-from ...platform_support.subprocess_call import run_in_subprocess
+from ...platform_support.subprocesses import run_in_subprocess
 from ..cache_key import CacheKey
 from ..mass_definiteness import is_definite_with_first_shape, is_mass_definite
 from ..modal_body import ModalBody

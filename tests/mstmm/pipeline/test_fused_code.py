@@ -16,7 +16,7 @@ import mstmm
 from mstmm.pipeline.fused_code import Fusion
 from mstmm.runtime.kernels.fused_library import open_library
 from mstmm.runtime.libraries import cache
-from mstmm.runtime.libraries.cache_maintenance import list_entries
+from mstmm.runtime.libraries.cache import list_entries
 from tests.support.libraries.library_recipes import NOBODY, entry_folders, false_compiler
 
 MASS, ARM, INERTIA, G = 1.7, 0.4, 0.3, 9.81

@@ -15,7 +15,7 @@ import pytest
 import mstmm
 from mstmm.errors import EnvironmentFailure
 from mstmm.runtime.kernels import kernel_store
-from mstmm.runtime.libraries.cache_folder import folder_problem
+from mstmm.runtime.libraries.cache_files import folder_problem
 from tests.support.libraries.library_recipes import false_compiler
 from tests.support.paths import TESTS
 

@@ -15,8 +15,8 @@ from pathlib import Path
 import pytest
 
 from mstmm.errors import EnvironmentFailure
-from mstmm.runtime.libraries import cache, cpu_features, toolchain
-from mstmm.runtime.libraries.cache_maintenance import clean_cache, list_entries
+from mstmm.runtime.libraries import cache, toolchain
+from mstmm.runtime.libraries.cache import clean_cache, list_entries
 from tests.support.libraries.library_recipes import (
     Kernel,
     assert_tidy,
@@ -100,7 +100,7 @@ def _updated_compiler(
 
 
 def _other_processor(recipe: cache.Recipe, patch: pytest.MonkeyPatch, folder: Path) -> cache.Recipe:
-    patch.setattr(cpu_features, "features", lambda: {"model name": "other", "flags": "sse2"})
+    patch.setattr(toolchain, "processor_features", lambda: {"model name": "other", "flags": "sse2"})
     return recipe
 
 
@@ -143,16 +143,16 @@ def test_processor_is_read_from_its_first_block(tmp_path: Path) -> None:
         "processor\t: 0\nmodel name\t: Some CPU\ncpu MHz\t: 1.0\nflags\t: fpu avx2\n\n"
         "processor\t: 1\nflags\t: fpu\n"
     )
-    found = cpu_features.features(x86)
+    found = toolchain.processor_features(x86)
     assert found["flags"] == "fpu avx2" and found["model name"] == "Some CPU"
     assert "cpu MHz" not in found and "host" not in found
     arm = tmp_path / "arm"
     arm.write_text("processor\t: 0\nFeatures\t: fp asimd\nCPU part\t: 0xd0c\n")
-    assert cpu_features.features(arm)["Features"] == "fp asimd"
+    assert toolchain.processor_features(arm)["Features"] == "fp asimd"
 
 
 def test_unknown_processor_shares_with_no_other_machine(tmp_path: Path) -> None:
-    assert cpu_features.features(tmp_path / "missing")["host"] == os.uname().nodename
+    assert toolchain.processor_features(tmp_path / "missing")["host"] == os.uname().nodename
 
 
 # --- what was changed behind our back -------------------------------------------------------------

@@ -17,8 +17,8 @@ import numpy as np
 import pytest
 
 from mstmm.runtime.libraries import cache
-from mstmm.runtime.libraries import cache_entry as entries
-from mstmm.runtime.libraries.cache_maintenance import clean_cache, count_unfinished_builds
+from mstmm.runtime.libraries.cache import clean_cache, count_unfinished_builds
+from mstmm.runtime.libraries.cache_files import read_entry
 from mstmm.runtime.libraries.library_build import remove_leftovers
 from mstmm.runtime.platform_support import file_lock
 from tests.support.libraries.library_recipes import (
@@ -96,7 +96,7 @@ def test_sixteen_want_five_and_some_are_killed(
         assert float(value) == 7.0 * int(factor) and how in ("compiled", "cached"), line
         assert not note, line
     for folder in entry_folders(cache_folder):  # whatever was left is whole
-        assert entries.read(folder) is not None
+        assert read_entry(folder) is not None
     for number in range(1, 6):
         built = cache.library(Kernel(number).recipe)
         assert library_value(built.path, built.key) == 7.0 * number

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from mstmm.errors import EnvironmentFailure
-from mstmm.runtime.libraries import cache, self_test
+from mstmm.runtime.libraries import cache, library_build
 from tests.support.libraries.library_recipes import (
     Kernel,
     alive,
@@ -190,7 +190,7 @@ def test_library_that_fails_its_test_is_not_kept(case: str, cache_folder: Path) 
 def test_library_that_hangs_in_its_test_is_not_kept(
     cache_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(self_test, "_TIMEOUT_S", 0.5)
+    monkeypatch.setattr(library_build, "_SELF_TEST_TIMEOUT_S", 0.5)
     more = "int mstmm_self_test(void) { for (volatile int i = 1; i;) ; return 0; }"
     assert "did not return" in refusal(Kernel(more=more))
     assert_tidy(cache_folder, 0)

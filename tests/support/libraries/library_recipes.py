@@ -13,8 +13,8 @@ from typing import Any
 
 import cffi
 
-from mstmm.runtime.libraries import cache_entry as entries
 from mstmm.runtime.libraries.cache import Recipe
+from mstmm.runtime.libraries.cache_files import read_entry
 from mstmm.runtime.libraries.library_build import LOCK_SUFFIX, UNFINISHED_PREFIX
 
 #: A user who owns nothing here.
@@ -70,7 +70,7 @@ def assert_tidy(cache: Path, count: int) -> None:
     folders = entry_folders(cache)
     assert len(folders) == count
     for folder in folders:
-        assert entries.read(folder) is not None
+        assert read_entry(folder) is not None
         names = {path.name for path in folder.iterdir()}
         assert names == {"entry.json", "kernel.c.gz", "kernel.so"}
     hidden = [path.name for path in cache.iterdir() if path.name.startswith(".")]

@@ -9,7 +9,7 @@ from tests.support.paths import ROOT, TESTS
 
 #: Signals to this process, to one it started, and to a command.
 SENDERS = (
-    "runtime/platform_support/test_subprocess_call.py::test_an_interrupt_ends_work_that_holds_the_lock",
+    "runtime/platform_support/test_subprocesses.py::test_an_interrupt_ends_work_that_holds_the_lock",
     "runtime/libraries/test_library_build.py::test_lock_and_compiler_end_with_their_killed_owner",
     "runtime/run/test_checkpoint.py::test_ctrl_c_in_the_second_run_costs_the_estimate_only",
     "mstmm/test_signal_handling.py::test_an_import_is_not_cut_off_unless_it_takes_long",

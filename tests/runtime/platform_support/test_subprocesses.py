@@ -17,7 +17,7 @@ import pytest
 from mstmm.errors import EnvironmentFailure, SceneError
 from mstmm.runtime.flexible.elastic import modal_elastic
 from mstmm.runtime.flexible.modal_body import ModalBody
-from mstmm.runtime.platform_support.subprocess_call import run_in_subprocess
+from mstmm.runtime.platform_support.subprocesses import run_in_subprocess
 from tests.support.scenes import elastic_bar as bar
 
 #: `hold` keeps Python's lock, as a sparse factorisation does.
