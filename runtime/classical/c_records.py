@@ -11,10 +11,10 @@ from mstmm.array_validation import Array
 from mstmm.errors import SceneError
 
 from ..engine.looped_engine import LoopedEngine
+from ..integrate.steppers.alpha_family import Scheme
 from ..kernels.c_records import CRecords
 from ..packing.packed_scene import PackedScene
 from .body_parts import Part
-from .integration_schemes import Scheme
 from .planar_and_spatial import MOTION, Form
 from .supported_elements import BALL, ELASTIC_BALL, ELASTIC_PIN, PIN
 

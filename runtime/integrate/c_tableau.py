@@ -11,7 +11,8 @@ import numpy as np
 from mstmm.array_validation import Array
 
 from .steppers import Tableau
-from .steppers.implicit_methods import Implicit, NewmarkFamily, Rosenbrock
+from .steppers.alpha_family import NewmarkFamily
+from .steppers.implicit_methods import Implicit, Rosenbrock
 
 
 @cache
@@ -27,19 +28,12 @@ def c_tableau(ffi: Any, tableau: Tableau) -> Any:
         kept_arrays.append(ffi.new("int[]", values or 1))
         return kept_arrays[-1]
 
-    record.n_stages, record.n_extra, record.n_dense = (
-        tableau.n_stages,
-        tableau.n_extra,
-        tableau.n_dense,
-    )
+    for name in ("n_stages", "n_extra", "n_dense", "error_order", "beta"):
+        setattr(record, name, getattr(tableau, name))
     record.n_errors = (tableau.E is not None) + (tableau.E_low is not None)
-    record.error_order, record.beta = tableau.error_order, tableau.beta
     starts, columns, weights = tableau.rows
-    record.starts, record.columns, record.weights = (
-        integers(starts),
-        integers(columns),
-        doubles(weights),
-    )
+    record.starts, record.columns = integers(starts), integers(columns)
+    record.weights = doubles(weights)
     record.c, record.c_extra = doubles(tableau.C), doubles(tableau.C_extra)
     record.stability_limit = tableau.real_stability_limit
     record.n_nodes, record.n_iterations = tableau.iterated or (0, 0)
@@ -47,10 +41,8 @@ def c_tableau(ffi: Any, tableau: Tableau) -> Any:
     if isinstance(tableau, Implicit):
         record.kind, record.gamma = tableau.kind, tableau.gamma
         record.n_inner, record.inner = len(tableau.inner_nodes), doubles(tableau.inner_nodes)
-        record.quadrature, record.roughness = (
-            doubles(tableau.quadrature),
-            doubles(tableau.roughness),
-        )
+        record.quadrature = doubles(tableau.quadrature)
+        record.roughness = doubles(tableau.roughness)
     if isinstance(tableau, Rosenbrock):
         record.d = doubles(tableau.d)
     if isinstance(tableau, NewmarkFamily):

@@ -20,11 +20,11 @@ from mstmm.errors import NumericalFailure, SceneError
 
 from ..classical.body_parts import Part, build_parts
 from ..classical.c_records import Stepper, scene_size
-from ..classical.integration_schemes import parse_scheme
 from ..classical.planar_and_spatial import Form, PartMovement, select_form
 from ..classical.state_conversion import StateConversion, start_movements
 from ..integrate.c_loop import Samples, Statistics, Status
 from ..integrate.settings import Settings
+from ..integrate.steppers.alpha_family import parse_scheme
 from ..packing.flexible.expansion import HELD
 from ..packing.loops.unsupported_loops import reject_loops
 from ..packing.qr_sweep import reject_qr_steps

@@ -16,7 +16,7 @@ from ..engine.looped_engine import LoopedEngine
 from ..integrate.c_loop import Integrator, Samples, Statistics, Status
 from ..integrate.settings import Settings
 from ..integrate.steppers import AUTO, Tableau, check_steps, get
-from ..integrate.steppers.implicit_methods import NewmarkFamily
+from ..integrate.steppers.alpha_family import NewmarkFamily
 from ..packing.loops.unsupported_loops import reject_loop_method, reject_speed_constraints
 from ..platform_support.interrupts import record_interrupts
 from .method_switching import MethodChoice

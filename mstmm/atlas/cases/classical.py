@@ -11,7 +11,6 @@ from ...array_validation import Array
 from ...errors import NumericalFailure
 from ...runtime.classical.body_parts import build_parts
 from ...runtime.classical.c_records import Stepper, scene_size
-from ...runtime.classical.integration_schemes import Scheme, newmark, parse_scheme
 from ...runtime.classical.planar_and_spatial import (
     AUXILIARY,
     AXES,
@@ -22,6 +21,7 @@ from ...runtime.classical.planar_and_spatial import (
 )
 from ...runtime.classical.state_conversion import StateConversion, start_movements
 from ...runtime.integrate.methods import ClassicalDiscreteTime
+from ...runtime.integrate.steppers.alpha_family import Scheme, newmark, parse_scheme
 from ...runtime.model.model import Model
 from ..case_definition import COUNT_SCALE, LOG_SCALE, CaseDefinition, MethodDefinition
 from ..error_measures import energy_gain, simulate_to_end

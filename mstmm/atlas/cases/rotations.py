@@ -7,9 +7,9 @@ from functools import cache, partial
 import numpy as np
 
 from ...array_validation import Array
-from ...runtime.classical.integration_schemes import generalised_alpha
 from ...runtime.integrate.methods import ClassicalDiscreteTime
 from ...runtime.integrate.steppers import get
+from ...runtime.integrate.steppers.alpha_family import generalised_alpha
 from ...runtime.integrate.steppers.implicit_methods import Rosenbrock
 from ...runtime.model.model import Model
 from ..case_definition import LOG_SCALE, CaseDefinition, MethodDefinition

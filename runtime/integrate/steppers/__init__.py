@@ -1,7 +1,8 @@
 """Time-integration methods by name.
 
 A new method is one file with a function `tableau() -> Tableau`: `Tableau` itself for an explicit
-Runge-Kutta method, a class of `implicit_methods` for an implicit one.  Inside the package its
+Runge-Kutta method, a class of `implicit_methods` for an implicit one.  A method of Newmark's family
+is a row in `alpha_family`.  Inside the package its
 module name is added to `EXPLICIT` or `IMPLICIT` in `methods.py`, and to the lists of its
 properties; outside it, call `register(my_tableau())` before the run.  The C loop reads the
 coefficients at run time.  CONTRIBUTING.md lists the tests to extend.
@@ -15,31 +16,15 @@ from importlib import import_module
 from mstmm.errors import SceneError
 
 from ..methods import EXPLICIT, IMPLICIT, METHODS_WITH_RADIUS, TANGENTS
-from .implicit_methods import with_position_constraints
+from .alpha_family import ALPHA_METHODS, alpha_method, with_position_constraints
 from .tableau import Tableau, from_monomials, hermite, to_read_only
 
 __all__ = [
-    "AUTO",
-    "AUTO_EXPLICIT",
-    "BUILT_IN",
-    "EXPLICIT",
-    "EXPLICIT_METHODS",
-    "IMPLICIT",
-    "INDEX3_SUFFIX",
-    "METHODS_WITH_RADIUS",
-    "TANGENTS",
-    "Tableau",
-    "check_radius",
-    "check_size",
-    "check_steps",
-    "check_tangent",
-    "from_monomials",
-    "get",
-    "hermite",
-    "names",
-    "register",
+    "AUTO", "AUTO_EXPLICIT", "BUILT_IN", "EXPLICIT", "EXPLICIT_METHODS", "IMPLICIT",
+    "INDEX3_SUFFIX", "METHODS_WITH_RADIUS", "TANGENTS", "Tableau", "check_radius", "check_size",
+    "check_steps", "check_tangent", "from_monomials", "get", "hermite", "names", "register",
     "to_read_only",
-]
+]  # fmt: skip
 
 BUILT_IN = EXPLICIT + IMPLICIT
 
@@ -67,8 +52,9 @@ _registered_methods: dict[str, Tableau] = {}
 def _built_in(name: str, radius: float | None = None) -> Tableau:
     if name.endswith(INDEX3_SUFFIX):
         return with_position_constraints(_built_in(name.removesuffix(INDEX3_SUFFIX), radius), name)
-    module = import_module(f".{name}", __name__)
-    tableau: Tableau = module.tableau() if radius is None else module.tableau(radius)
+    if name in ALPHA_METHODS:
+        return alpha_method(name, radius)
+    tableau: Tableau = import_module(f".{name}", __name__).tableau()
     return tableau
 
 

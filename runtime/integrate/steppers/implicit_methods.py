@@ -1,4 +1,4 @@
-"""Implicit methods: Rosenbrock, diagonally implicit, exponential, Newmark's family.
+"""Implicit methods by their tableaus: Rosenbrock and diagonally implicit ones.
 
 All integrate q' = N(q) u, u' = a, 0 = R(t, q, u, a) with a tangent of R.  Stage 0 of each is the
 slope at the start of the step, and k_s that at its end.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 from typing import Any, ClassVar
@@ -147,6 +147,33 @@ class Rosenbrock(Implicit):
         return _stability_function(alpha + gamma, self.weights_classical, z)
 
 
+def make_rosenbrock_pair(
+    name: str,
+    order: int,
+    gamma: float,
+    matrix: str,
+    coupling: str,
+    nodes: str,
+    time_weights: str,
+    dense: str,
+    dense_order: int,
+    source: str,
+) -> Rosenbrock:
+    """Stiffly accurate pair from published numbers: the last stage is the error of the step.
+
+    `matrix` and `coupling` are the rows of A and C, `time_weights` d, `dense` H of
+    `make_rosenbrock`.
+    """
+    stage_count = len(nodes.split())
+    A = lower_triangle(matrix, stage_count)
+    return make_rosenbrock(
+        name, order, gamma, A, lower_triangle(coupling, stage_count), parse_numbers(nodes),
+        parse_numbers(time_weights), B=[*A[-1][:-1], 1.0], E=np.eye(stage_count)[-1],
+        H=parse_numbers(dense).reshape(-1, stage_count), error_order=order - 1,
+        dense_order=dense_order, source=source,
+    )  # fmt: skip
+
+
 def make_rosenbrock(
     name: str,
     order: int,
@@ -206,6 +233,16 @@ def _stability_function(matrix: Array, weights: Array, z: ArrayLike) -> NDArray[
         for x in points.ravel()
     ]
     return np.reshape(np.array(values, dtype=np.complex128), points.shape)
+
+
+def two_position_arrays(order: int) -> dict[str, Any]:
+    """Attributes of a method whose C code needs no coefficients: positions of step and error."""
+    none, step = to_read_only(np.zeros((3, 3))), [0.0, 1.0, 0.0]
+    return {
+        "order": order, "A": none, "second": none, "C": to_read_only(np.zeros(3)),
+        "B": to_read_only(step), "E": to_read_only([0.0, 0.0, 1.0, 0.0]), "error_order": 2,
+        "dense": hermite(step), "dense_order": order,
+    }  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -278,138 +315,3 @@ def _start_weights(C: Sequence[float]) -> Array:
             others = [k for k in nearest if k != j]
             weights[i, j] = math.prod((C[i] - C[k]) / (C[j] - C[k]) for k in others)
     return weights
-
-
-@dataclass(frozen=True, eq=False)
-class NewmarkFamily(Implicit):
-    """Method of Newmark's family: coordinates and speeds are linear in the new acceleration.
-
-        (1 - alpha_m) a_1 + alpha_m a_0 = (1 - alpha_f) u'_1 + alpha_f u'_0
-        q_1 = q_0 + h u_0 + h^2 ((1/2 - beta) a_0 + beta a_1)
-        u_1 = u_0 + h ((1 - gamma) a_0 + gamma a_1)
-
-    Attributes:
-        alpha_m, alpha_f, beta_n, gamma_n: its constants; `alpha_m = alpha_f = 0` makes a = u'.
-        collocation: number of steps (Wilson: above 1, others: 1) after which the equations of
-            motion are satisfied; the acceleration is linear up to there.
-        backward: Houbolt's differences over three steps; the constants are used for the first two.
-        one_iteration: one linear solution per step, at the predictor u'_1 = u'_0.
-        on_positions: constraint rows are satisfied by positions at the end of a step, with their
-            multipliers as unknowns (index 3); the error of speeds is of the order of the method.
-            Shortened steps satisfy the rows by accelerations.
-    """
-
-    kind: ClassVar[int] = ALPHA
-    alpha_m: float = 0.0
-    alpha_f: float = 0.0
-    beta_n: float = 0.25
-    gamma_n: float = 0.5
-    collocation: float = 1.0
-    backward: bool = False
-    one_iteration: bool = False
-    on_positions: bool = False
-
-    def _check_consistency(self) -> None:
-        if not (self.beta_n > 0.0 and self.gamma_n > 0.0 and self.collocation >= 1.0):
-            raise ValueError(f"tableau {self.name}: its constants must be positive")
-
-    @property
-    def error_constant(self) -> float:
-        """Factor of h^2 times the change of acceleration in the local error of coordinates."""
-        return self.beta_n + (self.alpha_m - self.alpha_f) / 2.0 - 1.0 / 6.0
-
-    def amplification(self, z: ArrayLike) -> NDArray[np.complex128]:
-        """Largest eigenvalue of one step on the oscillation with the eigenvalue z / h."""
-        points = np.asarray(z, dtype=np.complex128)
-        eigenvalues = [max(np.linalg.eigvals(self._step(x)), key=abs) for x in points.ravel()]
-        return np.reshape(np.array(eigenvalues, dtype=np.complex128), points.shape)
-
-    def _step(self, z: complex) -> Array:
-        """Step matrix of u' = -c u - k q with h = 1, eigenvalues z and its conjugate."""
-        k, c = abs(z) ** 2, -2.0 * z.real
-        return _houbolt_step_matrix(k, c) if self.backward else self._newmark_step(k, c)
-
-    def _newmark_step(self, k: float, c: float) -> Array:
-        """Step matrix of the Newmark form on (q, u, u', a)."""
-        h, q, u, rate, a = self.collocation, *np.eye(4)
-        factor = (1.0 - self.alpha_f) / (1.0 - self.alpha_m)
-        known_part = (self.alpha_f * rate - self.alpha_m * a) / (1.0 - self.alpha_m)
-
-        def advance(h: float, new: Array) -> tuple[Array, Array]:
-            acceleration = known_part + factor * new
-            q_new = q + h * u + h * h * ((0.5 - self.beta_n) * a + self.beta_n * acceleration)
-            return q_new, u + h * ((1.0 - self.gamma_n) * a + self.gamma_n * acceleration)
-
-        free_motion = advance(h, np.zeros(4))
-        divisor = 1.0 + factor * (c * h * self.gamma_n + k * h * h * self.beta_n)
-        new = -(c * free_motion[1] + k * free_motion[0]) / divisor
-        new = rate + (new - rate) / self.collocation
-        return np.array([*advance(1.0, new), new, known_part + factor * new])
-
-
-def _houbolt_step_matrix(k: float, c: float) -> Array:
-    """Step matrix of Houbolt's method on the last three coordinates."""
-    q0, q1, q2 = np.eye(3)  # the most recent first
-    rest_a, rest_u = -5.0 * q0 + 4.0 * q1 - q2, (-18.0 * q0 + 9.0 * q1 - 2.0 * q2) / 6.0
-    q_new = -(rest_a + c * rest_u) / (2.0 + c * 11.0 / 6.0 + k)
-    return np.array([q_new, q0, q1])
-
-
-def make_newmark_family(
-    name: str, source: str, adaptive: bool = True, **constants: Any
-) -> NewmarkFamily:
-    """Method of Newmark's family, second order, from its constants."""
-    zeros = np.zeros(3)
-    return NewmarkFamily(
-        name=name, order=2, source=source, A=to_read_only(np.zeros((3, 3))), C=to_read_only(zeros),
-        B=to_read_only([0.0, 1.0, 0.0]), E=to_read_only([0.0, 0.0, 1.0, 0.0]) if adaptive else None,
-        error_order=2 if adaptive else 0, dense=hermite([0.0, 1.0, 0.0]), dense_order=2,
-        second=to_read_only(np.zeros((3, 3))), **constants,
-    )  # fmt: skip
-
-
-def with_position_constraints(tableau: Tableau, name: str) -> NewmarkFamily:
-    """Variant of a method that satisfies constraints by positions (index 3), with a new name."""
-    assert isinstance(tableau, NewmarkFamily)
-    source = f"{tableau.source}, on index 3 after Arnold and Brüls (2007)"
-    return replace(tableau, name=name, source=source, on_positions=True)
-
-
-@dataclass(frozen=True, eq=False)
-class Exponential(Implicit):
-    """Exponential Rosenbrock method: exact linearised motion, two evaluations per step.
-
-    Its weights are functions of a matrix, see `c/exponential.c`; the arrays here only define the
-    positions of the step and its error for the loop.
-    """
-
-    kind: ClassVar[int] = EXPONENTIAL
-
-    def _check_consistency(self) -> None:
-        if not self.max_unknowns > 0:
-            raise ValueError(f"tableau {self.name}: max_unknowns must be positive")
-
-    def amplification(self, z: ArrayLike) -> NDArray[np.complex128]:
-        """R(z) = exp(z) of one step on y' = lambda y with z = h lambda: exact."""
-        return np.asarray(np.exp(np.asarray(z, dtype=np.complex128)))
-
-
-def make_exponential(
-    name: str, order: int, error_order: int, most: int, source: str
-) -> Exponential:
-    """Exponential method from its orders; `most` limits coordinates and speeds together."""
-    zeros = np.zeros(3)
-    return Exponential(
-        name=name,
-        order=order,
-        source=source,
-        A=to_read_only(np.zeros((3, 3))),
-        C=to_read_only(zeros),
-        B=to_read_only([0.0, 1.0, 0.0]),
-        E=to_read_only([0.0, 0.0, 1.0, 0.0]),
-        error_order=error_order,
-        dense=hermite([0.0, 1.0, 0.0]),
-        dense_order=order,
-        second=to_read_only(np.zeros((3, 3))),
-        max_unknowns=most,
-    )

@@ -8,7 +8,7 @@ Jacobian.
 
 from __future__ import annotations
 
-from .implicit_methods import Implicit, lower_triangle, make_rosenbrock, parse_numbers
+from .implicit_methods import Rosenbrock, make_rosenbrock_pair
 
 _MATRIX = """
     1.544
@@ -36,21 +36,9 @@ _DENSE = """
 """
 
 
-def tableau() -> Implicit:
+def tableau() -> Rosenbrock:
     """The method `rodas4`."""
-    matrix = lower_triangle(_MATRIX, 6)
-    return make_rosenbrock(
-        "rodas4",
-        4,
-        0.25,
-        matrix,
-        lower_triangle(_COUPLING, 6),
-        parse_numbers(_NODES),
-        parse_numbers(_TIME),
-        B=[*matrix[-1][:-1], 1.0],
-        E=[0.0] * 5 + [1.0],
-        H=parse_numbers(_DENSE).reshape(-1, 6),
-        error_order=3,
-        dense_order=3,
-        source="Hairer and Wanner (1996), RODAS",
-    )
+    return make_rosenbrock_pair(
+        "rodas4", 4, 0.25, _MATRIX, _COUPLING, _NODES, _TIME,
+        _DENSE, 3, "Hairer and Wanner (1996), RODAS",
+    )  # fmt: skip

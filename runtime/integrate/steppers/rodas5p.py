@@ -9,7 +9,7 @@ Jacobian.
 
 from __future__ import annotations
 
-from .implicit_methods import Implicit, lower_triangle, make_rosenbrock, parse_numbers
+from .implicit_methods import Rosenbrock, make_rosenbrock_pair
 
 _MATRIX = """
     3.0
@@ -51,21 +51,9 @@ _DENSE = """
 """
 
 
-def tableau() -> Implicit:
+def tableau() -> Rosenbrock:
     """The method `rodas5p`."""
-    matrix = lower_triangle(_MATRIX, 8)
-    return make_rosenbrock(
-        "rodas5p",
-        5,
-        0.21193756319429014,
-        matrix,
-        lower_triangle(_COUPLING, 8),
-        parse_numbers(_NODES),
-        parse_numbers(_TIME),
-        B=[*matrix[-1][:-1], 1.0],
-        E=[0.0] * 7 + [1.0],
-        H=parse_numbers(_DENSE).reshape(-1, 8),
-        error_order=4,
-        dense_order=4,
-        source="Steinebach (2023), Rodas5P",
-    )
+    return make_rosenbrock_pair(
+        "rodas5p", 5, 0.21193756319429014, _MATRIX, _COUPLING, _NODES, _TIME,
+        _DENSE, 4, "Steinebach (2023), Rodas5P",
+    )  # fmt: skip

@@ -14,11 +14,11 @@ from mstmm import risk, version
 from mstmm.array_validation import Array
 from mstmm.plain_data import from_plain, to_plain
 
-from ...classical.integration_schemes import parse_scheme
 from ...integrate.achieved_error import from_dict
 from ...integrate.c_loop import Statistics, Status
 from ...integrate.settings import Settings
 from ...integrate.steppers import AUTO, get
+from ...integrate.steppers.alpha_family import parse_scheme
 from ...kernels.kernel_fingerprint import kernels_hash
 from ...run import classical_run, external_integrators
 from ...run.error_estimate import ErrorEstimate

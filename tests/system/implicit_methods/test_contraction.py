@@ -14,7 +14,7 @@ import mstmm
 from benchmarks.stiff import scenes
 from mstmm.runtime.engine.tangent_matrix import TangentMatrix
 from mstmm.runtime.integrate.steppers import get
-from mstmm.runtime.integrate.steppers.implicit_methods import NewmarkFamily
+from mstmm.runtime.integrate.steppers.alpha_family import NewmarkFamily
 
 STEPS = (1e-3, 3e-3, 1e-2, 3e-2)
 KNOWN = {

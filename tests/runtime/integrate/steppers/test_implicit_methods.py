@@ -12,10 +12,10 @@ import pytest
 from mstmm.errors import SceneError
 from mstmm.runtime.integrate import steppers
 from mstmm.runtime.integrate.steppers import Tableau, get, to_read_only
+from mstmm.runtime.integrate.steppers.alpha_family import NewmarkFamily
+from mstmm.runtime.integrate.steppers.exprb32 import Exponential
 from mstmm.runtime.integrate.steppers.implicit_methods import (
     DiagonallyImplicit,
-    Exponential,
-    NewmarkFamily,
     Rosenbrock,
     make_rosenbrock,
 )

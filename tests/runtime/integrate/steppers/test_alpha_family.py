@@ -11,7 +11,7 @@ import pytest
 import mstmm
 from mstmm.errors import SceneError
 from mstmm.runtime.engine.loops.loop_calls import LoopCalls
-from mstmm.runtime.integrate.steppers.genalpha import constants
+from mstmm.runtime.integrate.steppers.alpha_family import generalised_alpha
 from tests.support.scenes.constraints import cycloid, governor, on_a_plane, on_a_road
 from tests.support.scenes.linkages import four_bar, rod
 from tests.system.loops.test_implicit_methods import scene_of_laws
@@ -39,7 +39,7 @@ def reference_motion(radius: float, h: float, steps: int) -> tuple[Array, Array,
     """q, u (steps + 1, 3) and multipliers (steps, 2) of equations (12), (18) to (21) of M. Arnold,
     O. Brüls, Multibody System Dynamics 18 (2007) 185-202, on M q'' + Phi_q^T lambda = f, Phi = 0,
     by a full Newton matrix; auxiliary accelerations begin with q''."""
-    c = constants(radius)
+    c = vars(generalised_alpha(radius))
     mass, force = np.diag([MASS, MASS, MOMENT]), np.array([0.0, -MASS * GRAVITY, 0.0])
 
     def rows(q: Array) -> tuple[Array, Array]:
@@ -59,15 +59,15 @@ def reference_motion(radius: float, h: float, steps: int) -> tuple[Array, Array,
         new = rate.copy()
         for _ in range(12):
             aux = part * new + last * (c["alpha_f"] * rate - c["alpha_m"] * a)
-            q_1 = q + h * u + h * h * ((0.5 - c["beta_n"]) * a + c["beta_n"] * aux)
+            q_1 = q + h * u + h * h * ((0.5 - c["beta"]) * a + c["beta"] * aux)
             phi, phi_q = rows(q_1)
             turned = np.zeros((3, 3))
             turned[2, 2] = ARM * (lam @ [np.cos(q_1[2]), np.sin(q_1[2])])
-            cq = h * h * c["beta_n"] * part
+            cq = h * h * c["beta"] * part
             whole = np.block([[mass + cq * turned, phi_q.T], [cq * phi_q, np.zeros((2, 2))]])
             step = np.linalg.solve(whole, -np.array([*(mass @ new + phi_q.T @ lam - force), *phi]))
             new, lam = new + step[:3], lam + step[3:]
-        u = u + h * ((1 - c["gamma_n"]) * a + c["gamma_n"] * aux)
+        u = u + h * ((1 - c["gamma"]) * a + c["gamma"] * aux)
         q, rate, a = q_1, new, aux
         found.append((q, u))
         multipliers.append(lam)
