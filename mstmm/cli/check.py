@@ -96,7 +96,7 @@ def _check_function(what: str) -> Callable[[str], Report]:
 def _check_scene(path: str) -> Report:
     """Validate, compile, and evaluate the accelerations once."""
     import mstmm
-    from mstmm.runtime.packing.merging.simplification import COUNT_TEXTS
+    from mstmm.runtime.packing.simplification import COUNT_TEXTS
     from mstmm.runtime.run.step_stability import find_fastest_motion
 
     scene = mstmm.load_scene(path)

@@ -35,7 +35,7 @@ def size_text(result: Result) -> str:
 
 def simplification_counts(result: Result) -> str:
     """Numbers of simplifications of the scene; empty if there are none."""
-    from mstmm.runtime.packing.merging.simplification import COUNT_TEXTS
+    from mstmm.runtime.packing.simplification import COUNT_TEXTS
 
     kinds = [singular.kind for singular in result.model.simplifications]
     return "; ".join(

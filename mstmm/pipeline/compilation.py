@@ -106,10 +106,11 @@ def compile_level(
         raise SceneError(f'sweep "{sweep}" is not known; there are: {", ".join(SWEEPS)}')
     if not (isinstance(accuracy, Real) and accuracy > 0) or isinstance(accuracy, bool):
         raise SceneError(f"accuracy = {abbreviate(accuracy)}: expected a positive number")
+    from mstmm.runtime.packing.rigid_substitution import with_level
+    from mstmm.runtime.packing.simplification import parse_simplify
+
     from ..runtime.kernels import kernel_store
     from ..runtime.model.model import Model
-    from ..runtime.packing.flexible.rigid_substitution import with_level
-    from ..runtime.packing.merging.simplification import parse_simplify
     from .fused_code import DEFAULT_MAX_BODIES, MAX_BODIES, FusionFactory
 
     simplifications = parse_simplify(simplify)

@@ -410,8 +410,9 @@ def _interpret(
     tape: Any, kernel: KernelIR, inputs: Mapping[str, Sequence[float]], n: int = 0
 ) -> tuple[int, dict[str, list[float]]]:
     """Interpret a kernel without a C function as the engine does: (code, outputs)."""
+    from mstmm.runtime.kernels.c_records import c_tape
+
     from ..runtime.kernels import prebuilt_kernels
-    from ..runtime.kernels.tape_kernel import c_tape
 
     ffi, lib = prebuilt_kernels.module()
     references: list[Any] = []

@@ -19,6 +19,13 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
+from mstmm.runtime.kernels.scene_libraries import (
+    DerivativeLibrary,
+    FusedLibrary,
+    open_derivative_library,
+    open_library,
+)
+
 from ..abi import derivative_library as columns_abi
 from ..abi.fused_library import ABI_VERSION, COMPILER_FLAGS, OPTIONAL_FLAGS
 from ..errors import ElementError, EnvironmentFailure, SceneError
@@ -26,19 +33,17 @@ from ..ir import KernelIR
 from ..ir.element_spec import ElementSpec
 from ..ir.kernel import kernel_from_data
 from ..ir.scene_structure import BodyStructure, Key, Structure
-from ..runtime.kernels.derivative_library import DerivativeLibrary, open_derivative_library
-from ..runtime.kernels.fused_library import FusedLibrary, open_library
 from ..runtime.libraries.cache import BuiltLibrary, Recipe, find, open_cached_library
 from ..runtime.packing.fused_structure import structure_of
 
 if TYPE_CHECKING:
     from mstmm.runtime.engine.inputs import IndexPairs
+    from mstmm.runtime.kernels.prebuilt_kernels import Known
 
     from ..derive.fuse.scene_kernels import FusedSceneIR
     from ..runtime.linear.linear_equations import LinearEquations
     from ..runtime.linear.symbolic_matrices import SymbolicLinearModel
     from ..runtime.packing.packed_scene import PackedScene
-    from ..runtime.packing.scene_elements import Known
     from ..runtime.packing.system import System
 
 #: Largest number of bodies (including ends and sections of flexible bodies) that are fused unless

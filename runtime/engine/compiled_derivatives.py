@@ -16,10 +16,9 @@ from mstmm.ir import Constant, KernelIR, Store
 from mstmm.ir.differentiation import DERIVATIVE_PREFIX, differentiate
 from mstmm.ir.scene_structure import Structure
 
-from ..kernels.derivative_library import DerivativeLibrary
-from ..kernels.fused_library import FusedLibrary
 from ..kernels.prepared_calls import PreparedCall as Prepared
 from ..kernels.prepared_calls import prepare_call
+from ..kernels.scene_libraries import DerivativeLibrary, FusedLibrary
 from ..kernels.tape_kernel import TapeKernel
 from .fused_code import FusedCode
 from .inputs import LiveInputs

@@ -15,13 +15,12 @@ from mstmm.scene import Scene
 from ..flexible.modal_body import ModalBody
 from ..flexible.modal_scales import modal_sizes, radius_of_gyration
 from ..kernels import kernel_store
-from ..packing import product_sweep
+from ..kernels.prebuilt_kernels import Known
 from ..packing import scene_parameters as named_parameters
 from ..packing.coordinate_layout import Layout
-from ..packing.merging.simplification import LINKED, Simplification, SimplifyOptions
 from ..packing.packed_scene import PackedScene, resize_workspace
-from ..packing.scene_elements import Known
-from ..packing.scene_packing import pack, without_merging
+from ..packing.scene_packing import enable_product_sweep, pack, without_merging
+from ..packing.simplification import LINKED, Simplification, SimplifyOptions
 from .compiled_derivatives import LinearisationCode
 from .fused_code import FusedCode, NoFusedCode
 from .inputs import InputValue, apply_without_recompile, scene_with_inputs, with_input_values
@@ -72,7 +71,7 @@ class CompiledScene:
                 raise SceneError(f"scene: {failure}") from None
             self.looped = self.loop_start.engine
             if product_accuracy is not None:
-                product_sweep.enable_product_sweep(self.packed_scene, product_accuracy)
+                enable_product_sweep(self.packed_scene, product_accuracy)
                 resize_workspace(self.packed_scene, self.packed_scene.written.slots)
         elif self.packed_scene.refined:
             self.packed_scene.model.refines = count_tree_refinements(self.looped)

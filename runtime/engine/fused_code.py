@@ -13,8 +13,7 @@ from mstmm.array_validation import Array
 from .inputs import IndexPairs
 
 if TYPE_CHECKING:
-    from ..kernels.derivative_library import DerivativeLibrary
-    from ..kernels.fused_library import FusedLibrary
+    from ..kernels.scene_libraries import DerivativeLibrary, FusedLibrary
     from ..packing.system import System
 
 

@@ -17,8 +17,8 @@ from mstmm.scene.checks.inputs import input_references
 from mstmm.scene.validators.validation_messages import did_you_mean
 
 from ..discontinuities.active_expressions import active_expressions
+from ..kernels.c_records import Memory
 from ..packing.packed_scene import PackedScene
-from ..packing.records.memory import Memory
 from ..packing.records.model_record import write_inputs
 from ..packing.scene_parameters import scene_data, scene_from_data
 from ..packing.system import HeldInputs, System

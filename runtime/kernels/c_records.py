@@ -1,16 +1,17 @@
-"""Arrays of C structs in numpy memory: filled one by one through cffi, or column by column."""
+"""C records in memory of Python: arrays of structs, and the arrays and tapes they point to."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Sequence
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mstmm.array_validation import Integers
+from mstmm.array_validation import Array, Integers
 from mstmm.errors import SceneError
-from mstmm.scene.tables.chain import Members
+from mstmm.ir import KernelIR
+from mstmm.ir.tape import Tape, compile_tape
 
 _INTEGER_TYPES = {"int": np.int32, "int64_t": np.int64}
 
@@ -55,20 +56,76 @@ class CRecords:
         ]
 
 
-class Lookup(Mapping[str, T]):
-    """Mapping from names of bodies or hinges to values computed from their index on access."""
+def c_tape(ffi: Any, tape: Tape, kept: list[Any]) -> Any:
+    """Convert a tape to `mstmm_tape *`; its arrays are added to `kept`, which must outlive it."""
+    arrays = {
+        "input_lengths": ffi.new("int[]", list(tape.input_lengths) or [0]),
+        "constants": ffi.new("real[]", list(tape.constants) or [0.0]),
+        "instructions": ffi.new("int[]", list(tape.instructions) or [0]),
+        "outputs": ffi.new("int[]", list(tape.outputs) or [0]),
+    }
+    result = ffi.new("mstmm_tape *", arrays)
+    result.n_inputs = len(tape.input_lengths)
+    result.n_constants = len(tape.constants)
+    result.n_slots = tape.slots
+    result.n_instructions = len(tape.instructions) // 5
+    result.n_outputs = len(tape.outputs) // 4
+    kept += [result, arrays]
+    return result
 
-    def __init__(self, members: Members[Any], get: Callable[[int], T]) -> None:
-        self.members, self.get_number = members, get
 
-    def __getitem__(self, name: str) -> T:
-        number = self.members.find(name)
-        if number is None:
-            raise KeyError(name)
-        return self.get_number(number)
+#: Length of the blocks that hold small arrays side by side, in the order in which a sweep over many
+#: bodies reads them.
+_BLOCK_LENGTH = 4096
 
-    def __iter__(self) -> Iterator[str]:
-        return self.members.names()
 
-    def __len__(self) -> int:
-        return len(self.members)
+class Memory:
+    """Allocator of C arrays, tapes and records.
+
+    `keep_alive` are the references that keep them alive, `slots` is the largest workspace of a
+    tape.
+    """
+
+    def __init__(self, ffi: Any) -> None:
+        self.ffi, self.slots = ffi, 0
+        self.keep_alive: list[Any] = []
+        #: C type -> current block, and the length used.
+        self._blocks: dict[str, tuple[Any, int]] = {}
+
+    def new(self, kind: str, given: Any = None) -> Any:
+        """Allocate a record or an array of them."""
+        data = self.ffi.new(kind) if given is None else self.ffi.new(kind, given)
+        self.keep_alive.append(data)
+        return data
+
+    def reals(self, numbers: Sequence[float]) -> Any:
+        """Pointer `real *` to a copy of the numbers, stored after those of the last call."""
+        return self._store("real", list(numbers) or [0.0])
+
+    def ints(self, numbers: Sequence[int]) -> Any:
+        """Pointer `int *` to a copy of the numbers, stored after those of the last call."""
+        return self._store("int", list(numbers) or [0])
+
+    def _store(self, kind: str, numbers: list[Any]) -> Any:
+        count = len(numbers)
+        block, used = self._blocks.get(kind, (None, _BLOCK_LENGTH))
+        if used + count > _BLOCK_LENGTH:
+            block, used = self.new(f"{kind}[]", max(_BLOCK_LENGTH, count)), 0
+        block[used : used + count] = numbers
+        self._blocks[kind] = block, used + count
+        return block + used
+
+    def array(self, numbers: Array) -> Any:
+        """Pointer `real *` to the entries of an array, row by row."""
+        flat = np.ascontiguousarray(np.ravel(numbers) if np.size(numbers) else [0.0], dtype=float)
+        self.keep_alive.append(flat)
+        return self.ffi.from_buffer("real[]", flat)
+
+    def tape(self, tape: Tape) -> Any:
+        """Pointer `mstmm_tape *` to a copy of the tape."""
+        self.slots = max(self.slots, tape.slots)
+        return c_tape(self.ffi, tape, self.keep_alive)
+
+    def expression(self, kernel: KernelIR | None) -> Any:
+        """Tape of a kernel of expressions; NULL without one."""
+        return self.ffi.NULL if kernel is None else self.tape(compile_tape(kernel))

@@ -1,7 +1,9 @@
-"""Prebuilt kernels: the compiled module, loaded once, and its elements by kind and name."""
+"""Prebuilt kernels: the compiled module, loaded once, its elements, and their fingerprint."""
 
 from __future__ import annotations
 
+import hashlib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
@@ -10,8 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from mstmm.abi import element_library as abi
-from mstmm.errors import ElementError, EnvironmentFailure
+from mstmm.errors import ElementError, EnvironmentFailure, SceneError
 from mstmm.ir.element_spec import ElementSpec, Param
+from mstmm.ir.scene_structure import Key
 from mstmm.ir.tape import Tape
 
 from ..libraries.build_extension import BUILT_FROM, source_hash
@@ -109,3 +112,66 @@ def element(kind: str, name: str) -> Element:
         return elements()[kind, name]
     except KeyError:
         raise ElementError(f"there is no prebuilt {kind} called {name!r}") from None
+
+
+Known = Mapping[Key, Element]
+
+
+class Elements:
+    """Prebuilt and user-defined elements, by kind and name."""
+
+    def __init__(self, known: Known) -> None:
+        self.known = known
+
+    def __getitem__(self, key: Key) -> Element:
+        """Element with this key; KeyError if it is not defined."""
+        return self.known[key] if key in self.known else elements()[key]
+
+    def __contains__(self, key: Key) -> bool:
+        return key in self.known or key in elements()
+
+    def get(self, kind: str, name: str, user: str) -> Element:
+        """Element that the part `user` names as its type; SceneError if it is not defined."""
+        try:
+            return self[kind, name]
+        except KeyError:
+            raise SceneError(
+                f'scene: {kind} "{user}": type: unknown type "{name}"; generate it with: '
+                "mstmm generate FILE, or use one of: mstmm list"
+            ) from None
+
+
+def declared_numbers(
+    declared: Sequence[Param], given: Mapping[str, float], where: str
+) -> tuple[float, ...]:
+    """Values of declared parameters in their order, with defaults.
+
+    Raises SceneError with the name of the element (`where`) for missing or invalid values.
+    """
+    numbers = []
+    for p in declared:
+        value = given.get(p.name, p.default)
+        problem = ""
+        if value is None:
+            problem = "missing; expected a number"
+        elif p.minimum is not None and value < p.minimum:
+            problem = f"expected {p.minimum:g} {p.unit} or more, found {value:g}"
+        elif p.maximum is not None and value > p.maximum:
+            problem = f"expected {p.maximum:g} {p.unit} or less, found {value:g}"
+        if value is None or problem:
+            raise SceneError(f"scene: {where}: parameters.{p.name}: {problem}")
+        numbers.append(value)
+    return tuple(numbers)
+
+
+@cache
+def _manifest() -> bytes:
+    return files("mstmm.generated").joinpath("manifest.json").read_bytes()
+
+
+def kernels_hash(known: Mapping[Key, Element] | None) -> str:
+    """SHA-256 of the hashes of all generated kernels, and of elements that are not prebuilt."""
+    digest = hashlib.sha256(_manifest())
+    for (kind, name), element in sorted((known or {}).items()):
+        digest.update(f"{kind} {name} {element.hash}\n".encode())
+    return digest.hexdigest()

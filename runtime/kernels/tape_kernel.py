@@ -3,33 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
 from mstmm.array_validation import Array
 from mstmm.ir import KernelIR
-from mstmm.ir.tape import Tape, compile_tape
+from mstmm.ir.tape import compile_tape
 
 from . import prebuilt_kernels
-
-
-def c_tape(ffi: Any, tape: Tape, kept: list[Any]) -> Any:
-    """Convert a tape to `mstmm_tape *`; its arrays are added to `kept`, which must outlive it."""
-    arrays = {
-        "input_lengths": ffi.new("int[]", list(tape.input_lengths) or [0]),
-        "constants": ffi.new("real[]", list(tape.constants) or [0.0]),
-        "instructions": ffi.new("int[]", list(tape.instructions) or [0]),
-        "outputs": ffi.new("int[]", list(tape.outputs) or [0]),
-    }
-    result = ffi.new("mstmm_tape *", arrays)
-    result.n_inputs = len(tape.input_lengths)
-    result.n_constants = len(tape.constants)
-    result.n_slots = tape.slots
-    result.n_instructions = len(tape.instructions) // 5
-    result.n_outputs = len(tape.outputs) // 4
-    kept += [result, arrays]
-    return result
+from .c_records import c_tape
 
 
 class TapeKernel:

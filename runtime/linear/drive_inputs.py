@@ -25,8 +25,8 @@ from ..engine.looped_engine import LoopedEngine
 from ..engine.quantity_registry import acceleration_name, rate_unit
 from ..engine.tangent_matrix import TangentMatrix
 from ..packing.coordinate_layout import HingeSlots
-from ..packing.loops.system_variants import without_drives
 from ..packing.scene_packing import packed_system
+from ..packing.system_variants import without_drives
 from .mck_matrices import State
 
 if TYPE_CHECKING:

@@ -32,8 +32,8 @@ from ..engine.static_equilibrium import (
     unstable_coordinates,
 )
 from ..engine.tangent_matrix import TangentMatrix
-from ..packing.loops.system_variants import with_rotors
 from ..packing.scene_packing import packed_system
+from ..packing.system_variants import with_rotors
 from ..run.scene_system import SceneSystem
 from ..run.static_start.closed_states import ClosedStates
 

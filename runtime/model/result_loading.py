@@ -18,7 +18,7 @@ from mstmm.scene import Scene
 
 from ..engine.fused_code import NoFusedCode
 from ..kernels import kernel_store
-from ..kernels.kernel_fingerprint import kernels_hash
+from ..kernels.prebuilt_kernels import kernels_hash
 from ..platform_support.safe_files import require_regular_file, seal_is_broken
 from ..result import mesh_files
 from ..result.batch_result import BATCH_FORMAT

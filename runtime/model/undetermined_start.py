@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure, SceneError, UndeterminedMotionError
 
-from ..packing.records.trial_rotors import trial_rotors
+from ..packing.records.model_record import trial_rotors
 
 if TYPE_CHECKING:
     from ..engine.compiled_scene import CompiledScene

@@ -20,18 +20,27 @@ from ..flexible.kernel_inputs import (
     without_mass,
 )
 from ..flexible.modal_body import ModalBody
-from . import denavit_hartenberg, frame_placement
+from ..kernels.prebuilt_kernels import Elements, declared_numbers
+from . import internal_frames
 from .coordinate_layout import HingeSlots, Layout
-from .denavit_hartenberg import link_connection
-from .flexible.expansion import ExpandedScene
-from .frame_placement import GROUND, Placement, rigid_parameters
-from .merging.weld_geometry import end_pose
-from .merging.welded_bodies import WeldedBodies
-from .scene_elements import Elements, declared_numbers, kernel_type
+from .expansion import ExpandedScene
+from .internal_frames import GROUND, Placement, link_connection, rigid_parameters
+from .simplification import WeldedBodies, end_pose
 from .system import Arrays, BodyNumbers, BodyRun, ModalNumbers, Numbers, SectionNumbers
 
 #: The type of body whose numbers are in internal frames.
 RIGID = "rigid"
+
+
+#: Type that runs a weld which may be released; its speeds are prescribed until then.
+LETS_GO = "free"
+
+
+def kernel_type(hinge: Hinge, releases: Mapping[str, int]) -> str:
+    """Name of the element whose kernels compute the motion of a hinge."""
+    if hinge.is_weld and hinge.name in releases:
+        return LETS_GO
+    return hinge.type if hinge.facts is None else hinge.facts.runs_as
 
 
 class Bodies:
@@ -95,16 +104,16 @@ class Bodies:
         body, hinge = self.scene.bodies[run.body + k], self.scene.hinges[run.hinge + k]
         slots = self.layout.slots(run.hinge + k)
         inboard, outboard = hinge_frames(hinge)
-        hinge_placement = frame_placement.body_placement(body, run.outboard_end, outboard)
+        hinge_placement = internal_frames.body_placement(body, run.outboard_end, outboard)
         flexible = self.expanded.is_node(body.name)
         child = self._first_child(run, k) if self.align and not flexible else None
-        placement = denavit_hartenberg.align_frame(hinge_placement, hinge, child)
+        placement = internal_frames.align_frame(hinge_placement, hinge, child)
         self._placements.setdefault(run.body, []).append(placement)
         modal, section = self._modal_and_section(body.name, placement) if flexible else (None, None)
         link: Numbers = ()
         connection = _IDENTITY_CONNECTION
         if section is None or section.inward:
-            axial = self.align and not flexible and denavit_hartenberg.is_axial(hinge)
+            axial = self.align and not flexible and internal_frames.is_axial(hinge)
             link, connection = self._link_and_connection(run, k, inboard, placement, axial)
         hinge_p = _hinge_parameters(hinge)
         body_p, body_frame = self._body_parameters(run.body + k, placement)
@@ -150,10 +159,10 @@ class Bodies:
         """Transform from the parent's frame as link screws (may be empty) and as Rt, ro."""
         hinge = self.scene.hinges[run.hinge + k]
         parent, parent_placement = self._parent(run, k)
-        rotation, position = frame_placement.connection(
+        rotation, position = internal_frames.connection(
             parent_placement, parent, hinge, inboard, placement
         )
-        link = denavit_hartenberg.link_screws(rotation, position) if axial else None
+        link = internal_frames.link_screws(rotation, position) if axial else None
         if link is None:
             return (), (*rotation[0], *rotation[1], *rotation[2], *position)
         return link, link_connection(link)

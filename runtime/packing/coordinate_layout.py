@@ -1,4 +1,4 @@
-"""Layout of q and u: indices and names of the coordinates and speeds of every hinge."""
+"""Layout of q and u: indices, names and initial values of coordinates and speeds."""
 
 from __future__ import annotations
 
@@ -6,13 +6,18 @@ from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Mapping, Sequence, ValuesView
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import overload
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
 
-from mstmm.array_validation import Integers
+from mstmm.array_validation import Array, Integers
 from mstmm.errors import SceneError
-from mstmm.scene import Scene
+from mstmm.ir.hinge_properties import default_coordinates
+from mstmm.scene import Hinge, Scene
+
+if TYPE_CHECKING:
+    from ..flexible.modal_body import ModalBody
+
 
 #: Largest number of speeds for which dense matrices are computed: 3 GB a matrix.
 _MAX_DENSE_SPEEDS = 20_000
@@ -346,3 +351,43 @@ class _SlotsView(ValuesView[HingeSlots]):
             yield layout.slots(number)
         for number in range(layout.internal.stop, len(layout)):
             yield layout.slots(number)
+
+
+# --- initial state --------------------------------------------------------------------------------
+
+
+def start_values(
+    scene: Scene, layout: Layout, flexible: Mapping[str, ModalBody] | None = None
+) -> tuple[Array, Array]:
+    """Initial (q, u) of the scene; driven coordinates have the values of `initial`."""
+    q, u = np.zeros(layout.nq), np.zeros(layout.nu)
+    for group in layout.groups:
+        for k, slots in enumerate(group.hinges):
+            hinge_q, hinge_u = _hinge_values(scene.hinges[group.first + k], slots)
+            if group.count == 1:
+                q[slots.q_slice], u[slots.u_slice] = hinge_q, hinge_u
+                continue
+            for target, first, values in (
+                (q, group.q_starts(), hinge_q), (u, group.u_starts(), hinge_u)
+            ):  # fmt: skip
+                if len(values):
+                    repeats = first[k :: len(group.hinges)]
+                    target[repeats[:, None] + np.arange(len(values))] = values
+    for name, body in (flexible or {}).items():
+        slots = layout.modal[name]
+        if len(body.eta):
+            q[slots.q_slice] = body.eta
+        if len(body.etad):
+            u[slots.u_slice] = body.etad
+    return q, u
+
+
+def _hinge_values(hinge: Hinge, slots: HingeSlots) -> tuple[Array, Array]:
+    """Initial (q, u) of one hinge."""
+    q, u = np.zeros(slots.nq), np.zeros(slots.nu)
+    q[:] = default_coordinates(slots.nq, slots.quaternion)
+    if hinge.initial is not None and hinge.initial.q:
+        q[:] = hinge.initial.q
+    if hinge.initial is not None and hinge.initial.u:
+        u[:] = hinge.initial.u
+    return q, u

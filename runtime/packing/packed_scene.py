@@ -1,21 +1,140 @@
-"""Scene as records of the looped engine."""
+"""Scene with the positions of its parts, and its records of the looped engine."""
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
+from mstmm.graph.mechanism_graph import GROUND
 from mstmm.numerics.piecewise_polynomial import NUMBERS_PER_PIECE, PiecewisePolynomial
+from mstmm.scene import Scene, split_reference
+from mstmm.scene.checks.topology import Topology
+from mstmm.scene.tables.chain import Members
 
 from ..discontinuities.active_expressions import active_expressions
 from ..discontinuities.time_map import TimeMap, time_map
+from ..flexible.modal_body import ModalBody
+from ..kernels.prebuilt_kernels import Elements
+from .coordinate_layout import Layout
+from .event_functions import EventFunctions, event_order
+from .expansion import ExpandedScene
+from .internal_frames import Placement
 from .records.model_record import Slopes, Written, write_slopes
-from .scene_frames import Frames
-from .switch_margins import EventFunctions, event_order
+from .simplification import Simplification, SimplifyOptions
 from .system import System
+
+# --- hinges that are released during a run --------------------------------------------------------
+
+
+def releasable_hinges(scene: Scene) -> list[str]:
+    """Names of hinges that may be released, by their own `release` or by an event."""
+    names = [h.name for h in scene.hinge if h.release is not None]
+    for event in scene.event:
+        if event.do == "release" and event.hinge not in names:
+            names.append(str(event.hinge))
+    return names
+
+
+def hinges_released_by_time(scene: Scene, t: float) -> list[str]:
+    """Names of hinges that are released at t (s) by conditions that depend on time only."""
+    releases = [(h.name, h.release) for h in scene.hinge if h.release is not None]
+    events = [(str(e.hinge), e.when) for e in scene.event if e.do == "release"]
+    return [
+        name for name, condition in releases + events
+        if condition.depends_on_time_only and condition.evaluate(lambda _: t) > 0
+    ]  # fmt: skip
+
+
+T = TypeVar("T")
+
+
+# --- positions in the tree, in q and u, and in internal frames ------------------------------------
+
+
+class Lookup(Mapping[str, T]):
+    """Mapping from names of bodies or hinges to values computed from their index on access."""
+
+    def __init__(self, members: Members[Any], get: Callable[[int], T]) -> None:
+        self.members, self.get_number = members, get
+
+    def __getitem__(self, name: str) -> T:
+        number = self.members.find(name)
+        if number is None:
+            raise KeyError(name)
+        return self.get_number(number)
+
+    def __iter__(self) -> Iterator[str]:
+        return self.members.names()
+
+    def __len__(self) -> int:
+        return len(self.members)
+
+
+@dataclass
+class Frames:
+    """Scene of nodes with its tree, layout, internal frames and elements.
+
+    Attributes:
+        scene: of nodes, which replace the flexible bodies.
+        releases: hinge that may be released -> index in memory.
+        placements: body -> internal frame.
+        positions: body -> position in the tree.
+        hinge_position: hinge -> position of its outboard body in the tree.
+        simplified: simplifications done.
+        simplify: simplifications requested.
+    """
+
+    scene: Scene
+    topology: Topology
+    layout: Layout
+    elements: Elements
+    releases: Mapping[str, int]
+    placements: Mapping[str, Placement]
+    positions: Mapping[str, int]
+    hinge_position: Mapping[str, int]
+    expanded: ExpandedScene
+    simplified: tuple[Simplification, ...]
+    simplify: SimplifyOptions
+
+    @property
+    def user_scene(self) -> Scene:
+        """Scene as the user wrote it."""
+        return self.expanded.user_scene
+
+    @property
+    def flexible(self) -> Mapping[str, ModalBody]:
+        """Flexible bodies of the run by name."""
+        return self.expanded.bodies
+
+    @property
+    def modal(self) -> Mapping[str, ModalBody]:
+        """Flexible bodies of the run, and one-way coupled ones, by name."""
+        rigidified = self.expanded.rigidified
+        return {**self.flexible, **(rigidified.one_way if rigidified else {})}
+
+    def mass_center(self, name: str) -> tuple[float, ...]:
+        """Mass centre (3,) of a body in internal axes, m."""
+        return self.placements[name].point(self.scene.bodies.by_name[name].center_of_mass)
+
+    def end(self, reference: str) -> tuple[int, tuple[float, ...], tuple[float, ...]]:
+        """End "body.end" or origin "body": (position in the tree, axes (9), offset (3) in m)."""
+        name, end = split_reference(self.expanded.nodes.get(reference, reference))
+        if name == "ground":
+            return GROUND, (1, 0, 0, 0, 1, 0, 0, 0, 1), (0.0, 0.0, 0.0)
+        placement = self.placements[name]
+        body = self.scene.bodies.by_name[name]
+        axes = placement.axes(body.end_rotation(end))
+        return (
+            self.positions[name],
+            (*axes[0], *axes[1], *axes[2]),
+            placement.point(body.end_position(end)),
+        )
+
+
+# --- records --------------------------------------------------------------------------------------
 
 #: Largest number of cached time maps.
 _MAX_TIME_MAPS = 8

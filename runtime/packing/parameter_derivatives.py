@@ -26,12 +26,11 @@ from mstmm.ir.terms import Node, Terms
 from mstmm.numerics.dual import Dual, value_of
 from mstmm.scene import Hinge, Scene
 
+from ..kernels.prebuilt_kernels import Known
 from . import scene_parameters
 from .expression_tapes import MOVING
 from .fused_structure import structure_and_numbers, structure_of
-from .packed_scene import PackedScene
-from .scene_elements import Known
-from .scene_frames import Frames
+from .packed_scene import Frames, PackedScene
 from .system import System
 from .system_builder import system_of
 

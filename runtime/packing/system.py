@@ -87,7 +87,7 @@ class BodyNumbers:
     Attributes:
         straight, steady, turning: see `HingeSlots`.
         connection: Rt (9) and ro (3).
-        link: the same as screws about x and z (`denavit_hartenberg`); empty if impossible.
+        link: the same as screws about x and z (`internal_frames`); empty if impossible.
         height: shift along z of the internal frame from the hinge's outboard frame, m.
         hinge_p, body_p: parameters of the kernels.
         body_frame: internal frame in user axes: rotation (9), origin (3); empty for a rigid body.
@@ -349,7 +349,7 @@ class System:
         depends_on_time: whether an effort or load depends on time, also by an input.
         seeded_numbers: numbers in expressions that carry derivatives, by index in the port
             "moving".
-        coupling_kernel: kernel of the numbers of `couplings` (`loops.coupling_numbers`).
+        coupling_kernel: kernel of the numbers of `couplings` (`closures`).
     """
 
     nq: int

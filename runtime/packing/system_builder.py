@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -12,32 +12,34 @@ from mstmm.expression.expression import Expression
 from mstmm.ir import Port
 from mstmm.ir.hinge_properties import Param, builtin_hinges
 from mstmm.scene import Hinge, Scene, split_reference
-from mstmm.scene.checks.topology import Topology, build_topology
+from mstmm.scene.checks.topology import Topology, build_topology, may_have_loops
 from mstmm.scene.tables.hinge import HingeTable
 from mstmm.scene.tables.loads import Load
 
 from ..discontinuities.active_expressions import active_expressions
 from ..flexible.modal_body import ModalBody
-from ..kernels.c_records import Lookup
-from .bodies import Bodies
+from ..kernels.prebuilt_kernels import Elements, Known
+from .applied_laws import force_element_numbers, law_runs
+from .bodies import LETS_GO, Bodies, kernel_type
+from .closures import closure_numbers, coupling_numbers
 from .coordinate_layout import Group, HingeSlots, Layout
+from .expansion import ExpandedScene, curve_elements, cut_loops, expand
 from .expression_tapes import MOVING, Values, drive_kernel
-from .flexible.expansion import ExpandedScene, expand
-from .force_elements import force_element_numbers
-from .hinge_laws import law_runs
-from .hinge_release import releasable_hinges
-from .loops.closures import closure_numbers
-from .loops.coupling_numbers import coupling_numbers
-from .loops.curve_constraints import curve_elements
-from .loops.cut_tree import cut_loops
-from .loops.loop_detection import may_have_loops
-from .merging import link_detection
-from .merging.right_angle_snapping import with_right_angles
-from .merging.simplification import LINKED, LINKS, TURNS, WELDS, Simplification, SimplifyOptions
-from .merging.welded_bodies import WeldedBodies, contract_tree, find_welded_bodies
-from .scene_elements import LETS_GO, Elements, Known, kernel_type
-from .scene_frames import Frames
-from .system import HeldInputs, LoadNumbers, Numbers, System
+from .packed_scene import Frames, Lookup, releasable_hinges
+from .records.body_records import link_kernel
+from .simplification import (
+    LINKED,
+    LINKS,
+    TURNS,
+    WELDS,
+    Simplification,
+    SimplifyOptions,
+    WeldedBodies,
+    contract_tree,
+    find_welded_bodies,
+    with_right_angles,
+)
+from .system import BodyRun, HeldInputs, LoadNumbers, Numbers, System
 
 
 def expansion_of(scene: Scene, flexible: Mapping[str, ModalBody] | None = None) -> ExpandedScene:
@@ -49,7 +51,7 @@ def expansion_of(scene: Scene, flexible: Mapping[str, ModalBody] | None = None) 
         nodes, cuts = cut_loops(scene)
         return ExpandedScene(nodes, scene, {}, cuts=cuts)
     from ..flexible.flexible_bodies import modal_bodies
-    from .flexible.rigid_substitution import substitute_rigid_bodies
+    from .rigid_substitution import substitute_rigid_bodies
 
     substitution = substitute_rigid_bodies(scene, flexible or {})
     nodes, cuts = cut_loops(substitution.scene)
@@ -77,7 +79,7 @@ def system_of(
     `known` are elements in addition to the prebuilt ones.  Without `align` internal frames depend
     on the body's own hinge only, and are smooth functions of the scene's numbers.  `flexible` are
     all modal bodies if they are known already, `moving` the numbers of the port "moving".
-    `simplify` are the options of `merging.simplification`.
+    `simplify` are the options of `simplification`.
 
     Raises SceneError for hinges that do not form a tree, and for unknown types.
     """
@@ -91,7 +93,7 @@ def system_of(
     bodies = Bodies(expanded, tree, layout, elements, releases, align, LINKS in simplify, carried)
     runs = tuple(map(bodies.run, tree.runs))
     if not may_have_loops(scene):
-        simplifications += link_detection.link_simplifications(
+        simplifications += _link_simplifications(
             runs, (nodes.hinges.name(run.hinge) for run in tree.runs)
         )
     frames = Frames(
@@ -244,3 +246,29 @@ def _hinge_slots(
 
 def _names_and_units(entries: Sequence[Param]) -> tuple[tuple[str, ...], tuple[str, ...]]:
     return tuple(entry.name for entry in entries), tuple(entry.unit for entry in entries)
+
+
+# --- links ----------------------------------------------------------------------------------------
+
+#: Suffix of the kernel name of a link with rotor inertia.
+_ROTOR = "_rotor"
+
+
+def _link_simplifications(runs: Iterable[BodyRun], names: Iterable[str]) -> list[Simplification]:
+    """One record per kind of link, with the first hinge of every run; `names` are these hinges."""
+    hinges_by_kernel: dict[str, list[tuple[str, int]]] = {}
+    for run, name in zip(runs, names, strict=True):
+        if kernel := link_kernel(run.members[0]):
+            hinges_by_kernel.setdefault(kernel, []).append((name, run.count))
+    return [_simplification(kernel, hinges) for kernel, hinges in hinges_by_kernel.items()]
+
+
+def _simplification(kernel: str, hinges: list[tuple[str, int]]) -> Simplification:
+    kind = kernel.removeprefix("link_").removesuffix(_ROTOR)
+    count = sum(run_count for _, run_count in hinges)
+    rotor = " with rotor inertia" if kernel.endswith(_ROTOR) else ""
+    text = (
+        f'{count} {"hinge" if count == 1 else "hinges"} of type "{kind}"{rotor}: computed by the '
+        "looped engine with kernels for this type of motion (links)"
+    )
+    return Simplification(LINKS, tuple(name for name, _ in hinges), text)

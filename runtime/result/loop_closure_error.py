@@ -14,7 +14,7 @@ from mstmm.plain_data import stored_as
 from ..engine.loops.loop_analysis import NEGLIGIBLE_MISFIT
 from ..engine.loops.loop_calls import LoopCalls
 from ..integrate.steppers import INDEX3_SUFFIX
-from ..packing.loops.system_variants import LOCKING_GAP_FRACTION, characteristic_length
+from ..packing.system_variants import LOCKING_GAP_FRACTION, characteristic_length
 
 if TYPE_CHECKING:
     from ..engine.compiled_scene import CompiledScene

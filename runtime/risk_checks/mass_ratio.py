@@ -10,7 +10,7 @@ from mstmm.array_validation import Array
 from mstmm.risk import Risk
 
 from ..integrate.settings import Settings
-from ..packing.initial_state import start_values
+from ..packing.coordinate_layout import start_values
 from ..result.conditioning import MAX_PIVOT_LOSS, pivot_loss
 from .driven_path import driven_states
 

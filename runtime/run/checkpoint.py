@@ -18,7 +18,7 @@ from mstmm.errors import EnvironmentFailure, SceneError
 
 from ..integrate.c_loop import Samples
 from ..integrate.settings import Settings
-from ..kernels.kernel_fingerprint import kernels_hash
+from ..kernels.prebuilt_kernels import kernels_hash
 from ..platform_support.safe_files import read_arrays, replace_atomically, require_regular_file
 
 if TYPE_CHECKING:

@@ -25,9 +25,8 @@ from ..classical.state_conversion import StateConversion, start_movements
 from ..integrate.c_loop import Samples, Statistics, Status
 from ..integrate.settings import Settings
 from ..integrate.steppers.alpha_family import parse_scheme
-from ..packing.flexible.expansion import HELD
-from ..packing.loops.unsupported_loops import reject_loops
-from ..packing.qr_sweep import reject_qr_steps
+from ..packing.expansion import HELD
+from ..packing.scene_packing import reject_loops, reject_qr_steps
 from ..platform_support.interrupts import record_interrupts
 from .integration_run import MAX_SAMPLE_BYTES, SLICE, split
 from .scene_system import SceneSystem

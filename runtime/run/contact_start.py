@@ -14,7 +14,7 @@ from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure, SceneError
 
 from ..engine.looped_engine import LoopedEngine
-from ..packing.records.bounce_records import Bounce
+from ..packing.event_functions import Bounce
 
 #: Relative tolerance within which a state counts as on the contact and as at rest there: of the
 #: positions and speeds that the condition reads, at least of 1 rad or m and of 1 rad/s or m/s.

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from ..engine.compiled_scene import CompiledScene
     from ..integrate.c_loop import Integrator
     from ..integrate.settings import Settings
-    from ..kernels.fused_library import FusedLibrary
+    from ..kernels.scene_libraries import FusedLibrary
 
 #: Evaluations after which the evaluations of the whole run are extrapolated.
 _EXTRAPOLATE_AFTER = 2000

@@ -17,7 +17,7 @@ from ..integrate.c_loop import Integrator, Samples, Statistics, Status
 from ..integrate.settings import Settings
 from ..integrate.steppers import AUTO, Tableau, check_steps, get
 from ..integrate.steppers.alpha_family import NewmarkFamily
-from ..packing.loops.unsupported_loops import reject_loop_method, reject_speed_constraints
+from ..packing.scene_packing import reject_loop_method, reject_speed_constraints
 from ..platform_support.interrupts import record_interrupts
 from .method_switching import MethodChoice
 from .run_notes import chattering_note, missed_switch_note, step_too_long_note

@@ -27,7 +27,7 @@ from ..engine.quantity_registry import (
     acceleration_name,
     effort_names,
 )
-from ..kernels.tape_kernel import c_tape
+from ..kernels.c_records import c_tape
 from ..packing.coordinate_layout import HingeSlots
 from ..packing.expression_tapes import inputs_port, state_ports
 from ..packing.packed_scene import PackedScene, resize_workspace

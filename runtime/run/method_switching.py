@@ -18,7 +18,7 @@ from mstmm.plain_data import to_plain
 from ..integrate.c_loop import Integrator
 from ..integrate.settings import Settings
 from ..integrate.steppers import AUTO_EXPLICIT, get
-from ..packing.qr_sweep import reject_qr_steps
+from ..packing.scene_packing import reject_qr_steps
 from .method_segments import MethodSegment, from_rows
 from .scene_system import SceneSystem
 from .spectral_radius import FastestMode

@@ -9,7 +9,7 @@ import numpy as np
 from mstmm.risk import RUN, Risk
 
 from ..integrate.steppers import get
-from ..packing.switch_margins import MAX_SWITCHES
+from ..packing.event_functions import MAX_SWITCHES
 
 if TYPE_CHECKING:
     from ..integrate.settings import Settings

@@ -18,14 +18,12 @@ from mstmm.scene import Scene
 from ..engine.inputs import IndexPairs, LiveInputs
 from ..engine.looped_engine import LoopedEngine, Probe
 from ..engine.tangent_matrix import TangentMatrix
-from ..kernels.fused_library import FusedLibrary
-from ..kernels.tape_kernel import c_tape
+from ..kernels.c_records import c_tape
+from ..kernels.scene_libraries import FusedLibrary
 from ..packing.coordinate_layout import StateNames
-from ..packing.hinge_release import hinges_released_by_time
-from ..packing.packed_scene import resize_workspace
-from ..packing.qr_sweep import reject_qr_steps
-from ..packing.records.bounce_records import Bounce
-from ..packing.switch_margins import MAX_SWITCHES
+from ..packing.event_functions import MAX_SWITCHES, Bounce
+from ..packing.packed_scene import hinges_released_by_time, resize_workspace
+from ..packing.scene_packing import reject_qr_steps
 from .c_controllers import Controllers
 from .contact_start import check_contact_start
 

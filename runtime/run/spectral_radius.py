@@ -21,7 +21,7 @@ from mstmm.scene import Scene
 from ..engine.jacobian import eigenvalues
 from ..engine.looped_engine import LoopedEngine
 from ..engine.tangent_matrix import TangentMatrix
-from ..packing.qr_sweep import reject_qr_steps
+from ..packing.scene_packing import reject_qr_steps
 
 #: Power iterations; the choice of their start vector includes a further one.
 _ITERATIONS = 4

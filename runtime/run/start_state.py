@@ -5,7 +5,7 @@ from __future__ import annotations
 from mstmm.array_validation import Array
 
 from ..engine.compiled_scene import CompiledScene
-from ..packing.initial_state import start_values
+from ..packing.coordinate_layout import start_values
 from .scene_system import SceneSystem
 from .static_start.static_deformation import static_deformation, static_deformation_with_loops
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import mstmm
-from mstmm.runtime.packing.merging.simplification import Simplification
+from mstmm.runtime.packing.simplification import Simplification
 from mstmm.runtime.result.result import Result
 
 

@@ -157,7 +157,8 @@ def certificate_html(result: Result) -> str:
 
 def provenance_html(result: Result) -> str:
     """HTML of versions, hashes, and the scene with every default filled in."""
-    from ...runtime.kernels.kernel_fingerprint import kernels_hash
+    from mstmm.runtime.kernels.prebuilt_kernels import kernels_hash
+
     from ...runtime.result.export.provenance import program_versions, scene_hash
 
     rows = [*program_versions().items(), ("scene, SHA-256", scene_hash(result)),

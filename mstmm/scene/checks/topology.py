@@ -183,6 +183,13 @@ def build_topology(scene: SceneTables) -> Topology:
     return topology
 
 
+def may_have_loops(scene: SceneTables) -> bool:
+    """Whether a scene may have loops: hinges in excess of bodies, constraints or couplings."""
+    skeleton = scene.skeleton
+    excess = len(skeleton.hinge) != len(skeleton.body)
+    return excess or bool(scene.constraint or scene.coupling)
+
+
 def inboard_hinges_by_body(scene: SceneTables) -> dict[str, Hinge]:
     """Inboard hinge in the tree by body name, of a scene that has a tree."""
     skeleton = scene.skeleton

@@ -11,7 +11,7 @@ import numpy as np
 from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure, SceneError
 
-from ...packing.initial_state import start_values
+from ...packing.coordinate_layout import start_values
 from ..looped_engine import LoopedEngine
 from .near_parallel_axes import MIN_COUNTING_ANGLE, find_skewed_axis
 

@@ -20,14 +20,14 @@ import numpy as np
 from mstmm.array_validation import Array
 from mstmm.errors import LoopClosureError, NumericalFailure, SceneError
 
-from ...packing.loops.system_variants import (
+from ...packing.scene_packing import packed_system
+from ...packing.system_variants import (
     LOCKING_GAP_FRACTION,
     characteristic_length,
     with_rotors,
     with_speeds_prescribed,
     with_stiff_modes,
 )
-from ...packing.scene_packing import packed_system
 from ..looped_engine import LoopedEngine
 from .loop_calls import LoopCalls
 from .near_parallel_axes import MIN_COUNTING_ANGLE, find_skewed_axis, find_skewed_axis_by_gap

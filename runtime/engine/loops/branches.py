@@ -20,9 +20,9 @@ from mstmm.errors import MstmmError
 from mstmm.ir.hinge_properties import default_coordinates
 from mstmm.scene import Hinge, Scene
 
-from ...packing.loops.system_variants import characteristic_length
 from ...packing.packed_scene import PackedScene
 from ...packing.scene_packing import pack
+from ...packing.system_variants import characteristic_length
 from ..looped_engine import LoopedEngine
 from .assembly import Assembly
 

@@ -23,13 +23,13 @@ import numpy as np
 from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure
 
-from ...packing.loops.system_variants import (
+from ...packing.scene_packing import packed_system, without_merging
+from ...packing.system_variants import (
     LOCKING_GAP_FRACTION,
     characteristic_length,
     with_hinge_inertia,
     with_unit_masses,
 )
-from ...packing.scene_packing import packed_system, without_merging
 from ..looped_engine import LoopedEngine, symmetric_matrices
 from .loop_calls import REDUNDANT_PIVOT, LoopCalls
 

@@ -15,8 +15,8 @@ import numpy as np
 from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure
 
-from ...packing.loops.system_variants import without_drives
 from ...packing.scene_packing import packed_system
+from ...packing.system_variants import without_drives
 from ..looped_engine import LoopedEngine
 from .constraint_rank import geometric_loop_calls
 from .loop_analysis import LoopStart

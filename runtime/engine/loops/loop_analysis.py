@@ -12,16 +12,16 @@ import numpy as np
 from mstmm.array_validation import Array
 from mstmm.errors import LoopClosureError, MstmmError, NumericalFailure, SceneError
 
-from ...packing.initial_state import start_values
-from ...packing.loops.system_variants import (
+from ...packing.coordinate_layout import start_values
+from ...packing.records.loop_records import LoopRecords
+from ...packing.scene_packing import packed_system
+from ...packing.system_variants import (
     LOCKING_GAP_FRACTION,
     characteristic_length,
     with_coupling_values,
     with_row_choice,
     without_rows,
 )
-from ...packing.records.loops import LoopRecords
-from ...packing.scene_packing import packed_system
 from ..looped_engine import LoopedEngine
 from .acceleration_refinement import count_refinements, mass_ratio_text
 from .assembly import Assembly, RotorAssembly

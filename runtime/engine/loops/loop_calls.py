@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from mstmm.array_validation import Array
 from mstmm.ir.scene_structure import Key
 
-from ...packing.records.couplings import WrittenCoupling
-from ...packing.records.loops import WrittenClosure
+from ...packing.records.loop_records import WrittenClosure, WrittenCoupling
 from ...packing.system import Numbers
 from ..looped_engine import LoopedEngine
 

@@ -18,8 +18,8 @@ from mstmm.scene import Hinge, split_reference
 from mstmm.scene.checks.topology import build_topology
 from mstmm.scene.tables.scene_tables import SceneTables
 
-from ...packing.loops.system_variants import characteristic_length
 from ...packing.packed_scene import PackedScene
+from ...packing.system_variants import characteristic_length
 
 #: Largest angle (rad) that counts as small, and the smallest angle at which rows that are redundant
 #: with parallel axes may become independent.

@@ -7,8 +7,8 @@ import numpy as np
 from mstmm.array_validation import Array
 from mstmm.errors import MstmmError
 
-from ...packing.loops.system_variants import with_drives_released
 from ...packing.scene_packing import packed_system
+from ...packing.system_variants import with_drives_released
 from ..looped_engine import LoopedEngine
 from .assembly import Assembly
 from .constraint_rank import geometric_loop_calls

@@ -17,8 +17,8 @@ from mstmm.argument_validation import require_texts
 from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure
 
-from ...kernels.fused_library import FusedLibrary
 from ...kernels.prepared_calls import PreparedCall, prepare_call, unavailable_call
+from ...kernels.scene_libraries import FusedLibrary
 from ..fused_code import FusedCode
 from ..looped_engine import LoopedEngine, Probe
 from ..quantity_registry import POINT_COLUMNS, BodyReferences

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from mstmm.array_validation import Array, thread_count
 from mstmm.errors import NumericalFailure
 
-from ...kernels.fused_library import FusedLibrary
 from ...kernels.prepared_calls import PreparedCall, prepare_call, unavailable_call
+from ...kernels.scene_libraries import FusedLibrary
 from ..fused_code import FusedCode
 from ..inputs import LiveInputs
 from ..looped_engine import LoopedEngine

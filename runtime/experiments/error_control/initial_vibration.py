@@ -17,7 +17,7 @@ from mstmm.array_validation import Array, Integers
 from mstmm.errors import NumericalFailure
 
 from ...engine.jacobian import eigenvalues
-from ...packing.qr_sweep import reject_qr_steps
+from ...packing.scene_packing import reject_qr_steps
 from ...run.spectral_radius import fastest_at_start
 
 if TYPE_CHECKING:

@@ -16,11 +16,12 @@ from mstmm.numerics.rotations import ZERO, Matrix, Pose, Vector, from_orientatio
 from mstmm.scene import Body, Chain, Hinge, Load, Scene, Spring, split_reference
 from mstmm.scene.validators.scalars_and_vectors import GROUND
 
-from ...packing.flexible.rigid_substitution import substitute_rigid_bodies
-from ...packing.merging.referenced_parts import ReferencedParts, referenced_parts
-from ...packing.merging.weld_geometry import (
+from ...packing.rigid_substitution import substitute_rigid_bodies
+from ...packing.simplification import (
+    ReferencedParts,
     end_pose,
     merged_body,
+    referenced_parts,
     to_end,
     to_orientation,
     weld_pose,

@@ -26,8 +26,8 @@ from mstmm.errors import SceneError
 
 from ...engine.compiled_scene import CompiledScene
 from ...engine.looped_engine import LoopedEngine
-from ...packing.loops.system_variants import with_loops_open
 from ...packing.scene_packing import packed_system
+from ...packing.system_variants import with_loops_open
 from ..drive_inputs import Columns, DriveFactors, coordinate, residual_derivatives
 from ..input_channels import Channel, columns
 from ..mck_matrices import Matrices, State, matrices

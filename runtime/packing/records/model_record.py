@@ -1,8 +1,9 @@
-"""C record `mstmm_model` of a system, and the derivative tapes added to it on first use."""
+"""C record `mstmm_model` of a system, derivative tapes added on first use, and trial rotors."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,16 +17,13 @@ from mstmm.ir.tape import compile_tape
 from mstmm.numerics.piecewise_polynomial import PiecewisePolynomial
 
 from ...kernels import prebuilt_kernels
-from ...kernels.c_records import CRecords
-from ...kernels.tape_kernel import c_tape
+from ...kernels.c_records import CRecords, Memory, c_tape
+from ...kernels.prebuilt_kernels import Elements
 from ..load_coupling import LoadDependence, load_coupling
-from ..loops.planarity import motion_plane
-from ..scene_elements import Elements
 from ..system import ForceNumbers, LawNumbers, LawRun, LoadNumbers, System
 from .body_records import BodyRecords, attach_runs
-from .loops import LoopRecords, attach_loops
-from .memory import Memory
-from .planar_records import attach_planar_bodies
+from .loop_records import LoopRecords, attach_loops
+from .planar_records import attach_planar_bodies, motion_plane
 
 
 @dataclass(frozen=True)
@@ -226,3 +224,33 @@ def write_slopes(system: System, model: Any, ffi: Any) -> Slopes:
     for k, force in enumerate(system.forces):
         model.forces[k].effort_slope = tape(force.effort)
     return slopes
+
+
+# --- trial rotors ---------------------------------------------------------------------------------
+
+
+@contextmanager
+def trial_rotors(written: Written) -> Iterator[Callable[[int], None]]:
+    """Context in which hinges, by position in the tree, can be given rotors of 1 kg m^2.
+
+    All rotors are removed at its end.  Links do not support them, so the sweep then goes body by
+    body.
+    """
+    ffi, _ = prebuilt_kernels.module()
+    rotor = ffi.new("real[]", [1.0] * 6)
+    before: dict[int, tuple[object, int]] = {}
+    model = written.model
+    posed, model.needs_pose = model.needs_pose, 1
+
+    def add_rotor(place: int) -> None:
+        record = model.bodies[place]
+        before[place] = (record.rotor, int(record.generic))
+        record.rotor, record.generic = rotor, 1
+
+    try:
+        yield add_rotor
+    finally:
+        model.needs_pose = posed
+        for place, (old, generic) in before.items():
+            record = model.bodies[place]
+            record.rotor, record.generic = old, generic

@@ -19,7 +19,7 @@ from ...integrate.c_loop import Statistics, Status
 from ...integrate.settings import Settings
 from ...integrate.steppers import AUTO, get
 from ...integrate.steppers.alpha_family import parse_scheme
-from ...kernels.kernel_fingerprint import kernels_hash
+from ...kernels.prebuilt_kernels import kernels_hash
 from ...run import classical_run, external_integrators
 from ...run.error_estimate import ErrorEstimate
 from ...run.method_segments import from_rows

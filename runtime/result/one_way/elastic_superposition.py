@@ -18,7 +18,7 @@ import numpy as np
 from mstmm.array_validation import Array
 from mstmm.scene import split_reference
 
-from ...packing.flexible.held_rotations import constrained_rotations
+from ...packing.rigid_substitution import constrained_rotations
 from .response import Response, rigidified_bodies, split_node
 
 if TYPE_CHECKING:

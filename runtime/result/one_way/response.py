@@ -31,7 +31,7 @@ from .oscillators import Cells, Oscillators
 if TYPE_CHECKING:
     from ...engine.compiled_scene import CompiledScene
     from ...flexible.modal_body import ModalBody
-    from ...packing.flexible.rigid_substitution import RigidSubstitution
+    from ...packing.rigid_substitution import RigidSubstitution
     from ...run.trajectory import Trajectory
 
 

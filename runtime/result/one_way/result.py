@@ -12,8 +12,8 @@ from mstmm.errors import SceneError
 from mstmm.risk import Risk
 
 from ...engine.compiled_scene import CompiledScene
-from ...packing.flexible.rigid_substitution import with_level
-from ...packing.hinge_release import releasable_hinges
+from ...packing.packed_scene import releasable_hinges
+from ...packing.rigid_substitution import with_level
 from ...run.start_state import initial_state
 from ..flexible.body_motions import FlexibleBodies
 from ..flexible.modal_participation import participation_by_body

@@ -33,8 +33,8 @@ from ...discontinuities.active_expressions import active_expressions
 from ...integrate.c_loop import Failure, Integrator, Status, failure_text
 from ...integrate.settings import Settings, validate
 from ...integrate.steppers import AUTO, check_size, check_steps, get
+from ...packing.event_functions import has_switches
 from ...packing.scene_parameters import with_parameters
-from ...packing.switch_margins import has_switches
 from .. import classical_run, external_integrators
 from ..integration_run import (
     advance,
@@ -52,7 +52,7 @@ from .simd_lanes import LaneInputs, Lanes, run_lanes
 
 if TYPE_CHECKING:
     from ...engine.compiled_scene import CompiledScene
-    from ...kernels.fused_library import FusedLibrary
+    from ...kernels.scene_libraries import FusedLibrary
 
 
 @dataclass(frozen=True)

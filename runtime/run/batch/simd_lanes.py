@@ -19,8 +19,8 @@ from ...integrate.c_loop import Status
 from ...integrate.c_tableau import c_tableau
 from ...integrate.settings import Settings
 from ...integrate.steppers import get
-from ...kernels.fused_library import FusedLibrary
-from ...packing.records.memory import Memory
+from ...kernels.c_records import Memory
+from ...kernels.scene_libraries import FusedLibrary
 from ...packing.records.model_record import write_inputs
 from ..integration_run import SLICE
 from ..scene_system import SceneSystem

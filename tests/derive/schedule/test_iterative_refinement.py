@@ -14,7 +14,7 @@ from mstmm.pipeline.extended_precision import extended_precision_accelerations, 
 from tests.reference import newton_euler as dense
 from tests.reference.compare import seeded_scene, worst
 from tests.reference.jets import Array
-from tests.runtime.packing.test_qr_sweep import HEAVY, TIME, with_tip
+from tests.runtime.packing.test_scene_packing_qr import HEAVY, TIME, with_tip
 from tests.support.scenes.rods import chain, drawn_state
 
 

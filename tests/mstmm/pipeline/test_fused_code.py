@@ -14,7 +14,7 @@ import pytest
 
 import mstmm
 from mstmm.pipeline.fused_code import Fusion
-from mstmm.runtime.kernels.fused_library import open_library
+from mstmm.runtime.kernels.scene_libraries import open_library
 from mstmm.runtime.libraries import cache
 from mstmm.runtime.libraries.cache import list_entries
 from tests.support.libraries.library_recipes import NOBODY, entry_folders, false_compiler

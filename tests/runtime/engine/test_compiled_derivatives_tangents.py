@@ -12,7 +12,7 @@ import mstmm
 from mstmm.abi.derivative_library import SYMBOL
 from mstmm.errors import EnvironmentFailure
 from mstmm.runtime.engine import compiled_derivatives
-from mstmm.runtime.kernels.derivative_library import open_derivative_library
+from mstmm.runtime.kernels.scene_libraries import open_derivative_library
 from tests.reference.compare import seeded_scene, worst
 
 ARRAYS = ("q", "u", "efforts", "t", "rate_q", "rate_u")

@@ -14,7 +14,7 @@ from tests.reference.compare import worst
 from tests.reference.jets import Array
 from tests.reference.random_loops import closure_jacobian, random_mechanism
 from tests.reference.tree import read
-from tests.runtime.packing.loops.test_cut_tree import LAWS, SPEED, signs
+from tests.runtime.packing.test_expansion import LAWS, SPEED, signs
 from tests.support import planar_four_bar as planar
 from tests.support.models import compile_scene
 from tests.support.scenes.linkages import OBLIQUE, bricard, four_bar, legs

@@ -15,7 +15,7 @@ from tests.reference.compare import worst
 from tests.reference.jets import Array
 from tests.runtime.linear.test_drive_inputs_closed_loops import driven_five_bar
 from tests.runtime.model.test_equilibrium_closed_loops import five_bar
-from tests.runtime.packing.loops.test_cut_tree import LAWS
+from tests.runtime.packing.test_expansion import LAWS
 from tests.support.models import compile_scene
 from tests.support.scenes.linkages import OBLIQUE, bricard, four_bar, rod
 from tests.system.loops.test_flexible_against_tree import shackled_beam, slider_crank

@@ -1,4 +1,4 @@
-"""Switching functions (margins) of expressions, which are zero where a branch changes.
+"""Event functions: events, releases, switching functions (margins), and slopes of bounces.
 
 Comparisons, `sign`, `abs`, `min` and `max` change branch where their argument, or the difference
 of the two, is zero.  If that depends on the motion, a step must end there as at an event.  So even
@@ -7,14 +7,18 @@ short intervals between two switches are resolved.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from itertools import islice
 
+from mstmm.errors import SceneError
 from mstmm.expression.expression import SWITCHES, Expression, Name
+from mstmm.ir import Port
+from mstmm.ir.differentiation import derivative
 from mstmm.ir.graph import Graph, Node
-from mstmm.ir.tape import Tape
-from mstmm.scene import Hinge, Scene, split_reference
+from mstmm.ir.statements import Element
+from mstmm.ir.tape import Tape, compile_tape
+from mstmm.scene import Event, Hinge, Scene, split_reference
 
 from ..discontinuities.active_expressions import (
     ActiveExpression,
@@ -23,8 +27,15 @@ from ..discontinuities.active_expressions import (
 )
 from ..discontinuities.interval_enclosures import terms_of_time
 from .coordinate_layout import Layout
-from .expression_tapes import Resolver, event_tape, resolver
-from .records.bounce_records import Bounce, build_bounces
+from .expression_tapes import (
+    Resolver,
+    condition_value,
+    event_tape,
+    inputs_port,
+    resolver,
+    state_ports,
+    values_kernel,
+)
 
 #: Largest number of margins: each is evaluated several times per step.
 MAX_SWITCHES = 1000
@@ -153,3 +164,92 @@ def _with_spring_length(
         return nodes[name.parts[0]] if name.parts[0] in nodes else resolve(name)
 
     return resolve_spring
+
+
+# --- bounces --------------------------------------------------------------------------------------
+
+#: Numbers of an end that events read: its position (3), then its velocity (3).
+_NUMBERS, _POSITION = 6, 3
+
+
+@dataclass(frozen=True)
+class Bounce:
+    """Bounce of event number `event`.
+
+    `slopes` is a tape with the inputs of the event tape: the derivative of the event function by
+    time and by each of `places`: (coordinate, speed), or (-1 - 3 number of the end - component, 0).
+    """
+
+    event: int
+    restitution: float
+    slopes: Tape
+    places: tuple[tuple[int, int], ...]
+
+
+def build_bounces(
+    scene: Scene, layout: Layout, probes: dict[tuple[str, str], int]
+) -> tuple[Bounce, ...]:
+    """Build the bounces in the order of the events; `probes` are all ends that these read.
+
+    Raises SceneError for conditions on speeds, and on coordinates whose rates are not speeds.
+    """
+    return tuple(
+        _bounce(scene, layout, probes, number, event)
+        for number, event in enumerate(scene.events) if event.restitution is not None
+    )  # fmt: skip
+
+
+def _bounce(
+    scene: Scene, layout: Layout, probes: dict[tuple[str, str], int], number: int, event: Event
+) -> Bounce:
+    assert event.restitution is not None
+    graph = Graph()
+    value = condition_value(event.when, graph, resolver(graph, layout, probes=probes))
+    time, places, slopes = graph.element("t", 0), list[tuple[int, int]](), list[Node]()
+    for leaf in _leaves(value):
+        assert isinstance(leaf.leaf, Element)
+        if leaf.leaf.port in ("q", "u", "points"):
+            places.append(_position_reference(layout, event, leaf.leaf))
+            slopes.append(derivative(value, {leaf: 1}))
+    if not places:
+        raise SceneError(
+            f'event "{event.name}": do = "bounce" needs a condition on a coordinate (pin.q) or '
+            f"position (ball.y), found {event.when.text!r}"
+        )
+    ports = [*state_ports(layout), Port("points", (_NUMBERS * len(probes),)), inputs_port(layout)]
+    kernel = values_kernel(graph, "bounce", ports, [derivative(value, {time: 1}), *slopes])
+    return Bounce(number, event.restitution, compile_tape(kernel), tuple(places))
+
+
+def _position_reference(layout: Layout, event: Event, leaf: Element) -> tuple[int, int]:
+    """Entry of `Bounce.places` for an input of the event function."""
+    index = int(leaf.index[0])
+    if leaf.port == "points" and index % _NUMBERS < _POSITION:
+        return -1 - _POSITION * (index // _NUMBERS) - index % _NUMBERS, 0
+    if leaf.port == "q":
+        modal = {slots.q for slots in layout.modal.values()}
+        for slots in layout.owners:
+            if (
+                slots.q <= index < slots.q + slots.nq
+                and slots.rates_are_speeds
+                and slots.q not in modal
+            ):
+                return index, slots.u + index - slots.q
+    raise SceneError(
+        f'event "{event.name}": do = "bounce" needs a condition on positions, or on hinge '
+        f"coordinates whose rates are speeds, found {event.when.text!r}; write a condition on "
+        "positions such as ball.y <= 0.1"
+    )
+
+
+def _leaves(value: Node) -> Iterator[Node]:
+    """Array elements that a value depends on, without duplicates."""
+    seen, stack = set[int](), [value]
+    while stack:
+        node = stack.pop()
+        if node.number in seen:
+            continue
+        seen.add(node.number)
+        stack.extend(node.args)
+        if node.op == "element":
+            yield node

@@ -4,6 +4,11 @@ The rigid body has the mass, mass centre, inertia and ends of the undeformed one
 of a one-way body becomes a massless body welded to it, "blade/tip", so that the load of the weld is
 the total load there.  The cut hinges are chosen before the substitution, because the spanning tree
 of the new scene might differ.
+
+A run closes the loops with one-way bodies rigid.  The elastic response added afterwards keeps them
+closed if the sections in a loop do not move in the floating frame, except for rotations that its
+hinges leave free: beams between pins with simply supported shapes.  Constraint loads then do no
+work on the shapes, including those that rigid bodies do not determine.
 """
 
 from __future__ import annotations
@@ -18,21 +23,25 @@ from mstmm.argument_validation import require_word
 from mstmm.array_validation import Array
 from mstmm.errors import SceneError
 from mstmm.expression.expression import Expression, parse
+from mstmm.graph.closure_plan import ClosurePlan
+from mstmm.graph.mechanism_graph import Paths
 from mstmm.numerics.rotations import Matrix, to_quaternion
 from mstmm.scene import Body, Bushing, Constraint, End, Hinge, Load, Scene, Spring, split_reference
-from mstmm.scene.checks.topology import build_topology, inboard_hinges_by_body
+from mstmm.scene.checks.topology import build_topology, inboard_hinges_by_body, may_have_loops
+from mstmm.scene.tables.closures import ROLLING
+from mstmm.scene.tables.hinge_frames import initial_motion_axes
 from mstmm.scene.tables.scene_tables import rigid_body_of_beam
 
-from ...flexible.modal_body import ModalBody
-from ...flexible.modal_port import ModalPort
-from ..loops.loop_detection import may_have_loops
-from .one_way_loops import check_loop_ends, ends_on_body, loop_elements
+from ..flexible.modal_body import ModalBody
+from ..flexible.modal_port import ModalPort
 
 if TYPE_CHECKING:
+    from mstmm.scene import Hinge
     from mstmm.scene.tables.beam import Beam
     from mstmm.scene.tables.elastic import Elastic
 
-    from ...flexible.elastic.interface_nodes import Port
+    from ..flexible.elastic.interface_nodes import Port
+
 
 Joining = TypeVar("Joining", Spring, Bushing, Constraint)
 
@@ -245,8 +254,8 @@ def scale_expression(entry: Expression, factor: float) -> Expression:
 def _modal_body(scene: Scene, body: Beam | Elastic) -> ModalBody:
     from mstmm.scene.tables.beam import Beam
 
-    from ...flexible.beam.modal_beams import beam_body
-    from ...flexible.elastic.modal_elastic import modal_body
+    from ..flexible.beam.modal_beams import beam_body
+    from ..flexible.elastic.modal_elastic import modal_body
 
     if isinstance(body, Beam):  # no mass points: in the tree it is one rigid body
         return beam_body(scene, body.model_copy(update={"quadrature": False}))
@@ -256,7 +265,7 @@ def _modal_body(scene: Scene, body: Beam | Elastic) -> ModalBody:
 def _equivalent_rigid_body(body: Beam | Elastic, modal: ModalBody | None) -> Body:
     from mstmm.scene.tables.beam import Beam
 
-    from ...flexible.elastic.modal_elastic import rigid_inertia_and_ends
+    from ..flexible.elastic.modal_elastic import rigid_inertia_and_ends
 
     if isinstance(body, Beam):
         if body.viscous_drag:
@@ -302,3 +311,100 @@ def _rigid_body(
         name=name, mass=mass, center_of_mass=tuple(map(float, center)),
         inertia=tuple(map(float, entries)), ends=ends, allow_unphysical_inertia=True,
     )  # fmt: skip
+
+
+# --- one-way bodies in closed loops ---------------------------------------------------------------
+
+#: Largest motion of a section, relative to the size of the shape, that counts as rounding.
+_ROUNDING = 1e-6
+
+
+def loop_elements(scene: Scene, plan: ClosurePlan) -> tuple[Hinge | Constraint, ...]:
+    """Hinges of all loops, cut or not, followed by the constraints."""
+    mechanism, paths = plan.mechanism, Paths(plan.mechanism, plan.tree)
+    first = len(plan.cut_of)
+    row_groups = [
+        *(mechanism.groups[cut] for cut in plan.cut_of),
+        *plan.groups[first : first + len(scene.constraint)],
+    ]
+    crossed = {plan.tree[body] for group in row_groups for body, _ in paths.crossed_bodies(group)}
+    hinges = scene.skeleton.hinges
+    return (*(hinges[number] for number in sorted(crossed.union(plan.cut_of))), *scene.constraint)
+
+
+def check_loop_ends(
+    bodies: Mapping[str, ModalBody], elements: tuple[Hinge | Constraint, ...]
+) -> None:
+    """Raise SceneError if a shape of one of the bodies moves a section that is in a loop."""
+    for name, body in bodies.items():
+        for element, end, inboard in ends_on_body(name, elements):
+            port = body.ports[end]
+            projection = _constrained_projection(element, port, inboard)
+            shift, rotation = _section_motion(body, port, projection)
+            moving = shift + rotation > _ROUNDING
+            if not moving.any():
+                continue
+            table = "constraint" if isinstance(element, Constraint) else "hinge"
+            first = int(moving.argmax())
+            motion = "moves" if shift[first] > _ROUNDING else "rotates"
+            raise SceneError(
+                f'"{name}": model: shape {body.modes[first]} {motion} the end "{end}", where '
+                f'{table} "{element.name}" closes a loop that one-way coupling would open; for a '
+                'beam between pins use basis = "simply-supported" and frame = "chord", otherwise '
+                'model = "flexible"'
+            )
+
+
+def ends_on_body(
+    name: str, elements: tuple[Hinge | Constraint, ...]
+) -> Iterator[tuple[Hinge | Constraint, str, bool]]:
+    """Ends of a body on the elements: (element, end, whether it is the element's inboard one)."""
+    for element in elements:
+        pair = (
+            (element.from_, element.to) if isinstance(element, Constraint)
+            else (element.inboard, element.outboard)
+        )  # fmt: skip
+        for inboard, reference in zip((True, False), pair, strict=True):
+            body, end = split_reference(reference)
+            if body == name:
+                yield element, end, inboard
+
+
+def _constrained_projection(element: Hinge | Constraint, port: ModalPort, inboard: bool) -> Array:
+    """Projection (3, 3) onto the rotations of a section that an element constrains."""
+    if isinstance(element, Constraint):
+        return np.eye(3) * (element.type == ROLLING)
+    axes = port.rotation @ np.array(element.rotation) if inboard else port.rotation
+    return constrained_rotations(element, axes, unknown=np.eye(3))
+
+
+def _section_motion(body: ModalBody, port: ModalPort, projection: Array) -> tuple[Array, Array]:
+    """Displacement and constrained rotation (modes,) of a section, relative to the shapes' size."""
+    size = np.sqrt(np.diag(body.Mff) / body.mass)
+    positions = np.array([port.position for port in body.ports.values()])
+    length = float(np.linalg.norm(np.ptp(positions, axis=0))) or 1.0
+    shift = np.abs(port.phi).max(axis=0)
+    rotation = np.abs(projection @ port.theta).max(axis=0)
+    return shift / size, length * rotation / size
+
+
+def constrained_rotations(hinge: Hinge, rotation: Array, unknown: Array) -> Array:
+    """Projection (3, 3) of rotations onto those that a hinge constrains, in body axes.
+
+    `rotation` are the axes of its outboard end in those of the body.  `unknown` is returned for
+    hinges whose free axes rotate.  Driven coordinates are constrained.
+    """
+    motions, facts = initial_motion_axes(hinge), hinge.facts
+    if facts is None or motions is None:
+        return unknown
+    drive = hinge.drive or (None,) * len(motions)
+    free = [k for k in facts.turns if drive[k] is None]
+    if not free:
+        return np.eye(3)
+    if len(free) >= 3:
+        return np.zeros((3, 3))
+    if len(free) > 1 or "q" in facts.varies[free[0]][3:]:
+        return unknown
+    axis = rotation @ np.array(motions[free[0]][1])
+    axis /= np.linalg.norm(axis)
+    return np.eye(3) - np.outer(axis, axis)

@@ -1,20 +1,24 @@
-"""Loaded fused library: the compiled accelerations of one scene, for one state or a batch."""
+"""Loaded libraries of one scene: its compiled accelerations, and its derivatives."""
 
 from __future__ import annotations
 
 import ctypes
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mstmm.abi.fused_library import ABI_VERSION, SYMBOL
+from mstmm.abi import derivative_library as derivative_abi
+from mstmm.abi import fused_library as fused_abi
 from mstmm.array_validation import Array
 from mstmm.errors import EnvironmentFailure
 
 from . import prebuilt_kernels
+
+# --- fused library --------------------------------------------------------------------------------
 
 Codes = NDArray[np.int32]
 
@@ -43,16 +47,17 @@ def _find_descriptor(loaded: ctypes.CDLL, path: Path, key: str) -> Any:
     """`const mstmm_fused *` of a loaded library; EnvironmentFailure if it is another library."""
     ffi, _ = prebuilt_kernels.module()
     try:
-        abi_number = ctypes.c_int.in_dll(loaded, SYMBOL)
+        abi_number = ctypes.c_int.in_dll(loaded, fused_abi.SYMBOL)
     except ValueError:
         raise EnvironmentFailure(
-            f"{path} is no fused library: it has no {SYMBOL}; remove it: mstmm cache clean"
+            f"{path} is no fused library: it has no {fused_abi.SYMBOL}; "
+            "remove it: mstmm cache clean"
         ) from None
     # The ABI number is the first field of every layout, so that it can be read before the others.
-    if abi_number.value != ABI_VERSION:
+    if abi_number.value != fused_abi.ABI_VERSION:
         raise EnvironmentFailure(
-            f"{path} was built for layout {abi_number.value}, this mstmm has {ABI_VERSION}; "
-            "remove it: mstmm cache clean"
+            f"{path} was built for layout {abi_number.value}, this mstmm has "
+            f"{fused_abi.ABI_VERSION}; remove it: mstmm cache clean"
         )
     descriptor = ffi.cast("const mstmm_fused *", ctypes.addressof(abi_number))
     stored_key = prebuilt_kernels.text(ffi, descriptor.key)
@@ -164,3 +169,83 @@ class SingleStateCall:
     def __call__(self) -> int:
         """Fill qdot and udot; returns 0, or a guard code, with which their content is invalid."""
         return int(self._function(*self._pointers))
+
+
+# --- library of derivatives -----------------------------------------------------------------------
+
+
+class _CCall(ctypes.Structure):
+    _fields_ = (
+        ("inputs", ctypes.c_void_p * 6), ("strides", ctypes.c_longlong * 6),
+        ("states", ctypes.c_longlong), ("n", ctypes.c_longlong), ("directions", ctypes.c_void_p),
+        ("direction_stride", ctypes.c_longlong), ("result", ctypes.c_void_p),
+    )  # fmt: skip
+
+
+_RUN_TYPE = ctypes.CFUNCTYPE(None, ctypes.POINTER(_CCall))
+
+
+class _CKernel(ctypes.Structure):
+    _fields_ = (("width_in", ctypes.c_int), ("width_out", ctypes.c_int), ("run", _RUN_TYPE))
+
+
+class _CLibrary(ctypes.Structure):
+    _fields_ = (
+        ("abi", ctypes.c_int), ("n_kernels", ctypes.c_int), ("key", ctypes.c_char_p),
+        ("kernels", ctypes.POINTER(_CKernel)),
+    )  # fmt: skip
+
+
+def open_derivative_library(path: Path, key: str) -> DerivativeLibrary:
+    """Open a library of derivatives that was built with `key`.
+
+    Raises EnvironmentFailure, with the library closed, if it cannot be loaded or has another key.
+    """
+    remedy = "remove it: mstmm cache clean"
+    try:
+        handle = ctypes.CDLL(os.fspath(path), mode=os.RTLD_NOW | os.RTLD_LOCAL)
+    except OSError as error:
+        raise EnvironmentFailure(f"{path} cannot be loaded ({error}); {remedy}") from error
+    try:
+        descriptor = _CLibrary.in_dll(handle, derivative_abi.SYMBOL)
+        is_expected = (
+            descriptor.abi == derivative_abi.ABI_VERSION and descriptor.key == key.encode()
+        )
+    except ValueError:
+        is_expected = False
+    if not is_expected:
+        import _ctypes
+
+        _ctypes.dlclose(handle._handle)
+        raise EnvironmentFailure(f"{path} is not the expected library of derivatives; {remedy}")
+    return DerivativeLibrary(handle, descriptor)
+
+
+class DerivativeLibrary:
+    """Compiled directional derivatives of a scene's functions; safe to call from several threads.
+
+    A kernel is named by its index in the library.
+    """
+
+    def __init__(self, loaded: ctypes.CDLL, found: _CLibrary) -> None:
+        self._library = loaded
+        self._kernels = [found.kernels[k] for k in range(found.n_kernels)]
+
+    def run(self, kernel: int, inputs: Sequence[Array], directions: Array) -> Array:
+        """Derivatives (states, n, width_out) along directions (states or 1, n, width_in).
+
+        `inputs` are p, t, q, u, memory, efforts, each contiguous, (states or 1, width); an array
+        with one row is shared by all states.
+        """
+        kernel_record = self._kernels[kernel]
+        rows = np.ascontiguousarray(directions)
+        states = max(len(rows), *map(len, inputs))
+        result = np.empty((states, rows.shape[1], kernel_record.width_out))
+        call = _CCall(states=states, n=rows.shape[1])
+        for k, array in enumerate(inputs):
+            call.inputs[k] = array.ctypes.data
+            call.strides[k] = array.shape[1] if len(array) > 1 else 0
+        call.directions, call.result = rows.ctypes.data, result.ctypes.data
+        call.direction_stride = rows[0].size if len(rows) > 1 else 0
+        kernel_record.run(ctypes.byref(call))
+        return result

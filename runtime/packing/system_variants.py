@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..bodies import RIGID
-from ..system import DIRECTIONS, Arrays, BodyNumbers, BodyRun, ClosureNumbers, System
+from .bodies import RIGID
+from .system import DIRECTIONS, Arrays, BodyNumbers, BodyRun, ClosureNumbers, System
 
 #: Gap of a redundant row, relative to the length of the scene, at which a rigid mechanism locks.
 LOCKING_GAP_FRACTION = 1e-3

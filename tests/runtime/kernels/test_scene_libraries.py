@@ -12,7 +12,7 @@ import mstmm
 from mstmm.abi import fused_library as fused_abi
 from mstmm.derive.codegen.scene_text import fused_sources
 from mstmm.errors import EnvironmentFailure
-from mstmm.runtime.kernels.fused_library import FusedLibrary, SingleStateCall, open_library
+from mstmm.runtime.kernels.scene_libraries import FusedLibrary, SingleStateCall, open_library
 from mstmm.runtime.packing.fused_structure import structure_of
 from tests.support.kernels.fused_helpers import COMPILERS
 from tests.support.scenes.rods import chain, drawn_state

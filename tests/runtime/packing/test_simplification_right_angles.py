@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 import mstmm
 from mstmm.cli.app import app
 from mstmm.numerics.rotations import from_rpy, to_quaternion
-from mstmm.runtime.packing.merging.right_angle_snapping import nearest_right_angles
+from mstmm.runtime.packing.simplification import nearest_right_angles
 from tests.support.models import non_link_simplifications
 
 ROD = {"mass": 2.0, "center_of_mass": [0.4, 0.1, 0], "inertia": [0.11, 0.2, 0.3]}

@@ -1,4 +1,11 @@
-"""Expansion of flexible bodies: from the user's scene to the scene of nodes.
+"""Expansion of a user's scene into nodes: loops are cut, flexible bodies become rigid ones.
+
+The frame C of a cut hinge is a massless body with the ends of the body B that it replaces, so that
+the cut hinge keeps its kernels, coordinates, law and drive.  The constraint rows of the loop
+require that C coincides with B.  A constraint has a massless frame at its end `from`.  For a point
+on a curve, this frame is on a hinge that moves along the curve: the curve parameter s is its
+coordinate, and rows hold the other end in the frame across the curve.  So no search for the nearest
+point is needed, curves may intersect themselves, and revolutions around closed curves are counted.
 
 A flexible body "blade" becomes a frame node "blade" (its floating frame, with the modes) and a node
 per end.  If its inboard section moves relative to the frame, that section gets a massless node.
@@ -9,17 +16,169 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 from mstmm.errors import SceneError
-from mstmm.numerics.rotations import to_matrix, to_quaternion
-from mstmm.scene import Body, Hinge, Scene, split_reference
-from mstmm.scene.tables.body import End
+from mstmm.expression.derivatives import motion
+from mstmm.ir import KernelIR, Port
+from mstmm.ir.differentiation import differentiate
+from mstmm.ir.element_spec import ElementSpec
+from mstmm.ir.graph import Graph
+from mstmm.ir.hinge_properties import HingeProperties, Param
+from mstmm.ir.tape import compile_tape
+from mstmm.numerics.rotations import IDENTITY, to_matrix, to_quaternion
+from mstmm.scene import Body, Constraint, End, Hinge, Scene, split_reference
+from mstmm.scene.checks.topology import build_topology, may_have_loops
+from mstmm.scene.tables.closures import CURVE
+from mstmm.scene.tables.hinge import Initial
+from mstmm.scene.tables.hinge_frames import axes_about
 from mstmm.scene.tables.loads import Load
+from mstmm.scene.validators.scalars_and_vectors import GROUND
 
-from ...flexible.modal_body import ModalBody
-from ...flexible.modal_port import MassPoint, ModalPort
-from ..loops.cut_tree import Cut
+from ..flexible.modal_body import ModalBody
+from ..flexible.modal_port import MassPoint, ModalPort
+from ..kernels.prebuilt_kernels import Element
+from .coordinate_layout import OF_CONSTRAINT
 from .rigid_substitution import RigidSubstitution, scale_expression
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from mstmm.ir.scene_structure import Key
+
+
+# --- hinges along curves --------------------------------------------------------------------------
+
+_TITLE, _S, _RATE = "motion along a curve", Param("s"), Param("s_rate", "1/s")
+_OUTPUTS = (Port("R", (3, 3)), Port("d", (3,)), Port("H", (6,)), Port("v", (3,)), Port("w", (3,)),
+            Port("c", (6,)), Port("qdot", (1,)))  # fmt: skip
+
+
+def curve_hinge(constraint: Constraint, held: Hinge) -> Hinge:
+    """Copy of the hinge `held` that moves along the curve of the constraint."""
+    name = _type_name(constraint)
+    hinge = held.model_copy(update={
+        "type": name, "initial": Initial(q=(constraint.start or 0.0,), u=(0.0,))
+    })  # fmt: skip
+    hinge.__dict__["facts"] = HingeProperties(
+        name, _TITLE, (_S,), (_RATE,), (), "own", (),
+        name, None, True, False, ("qqq000",), _kernel(constraint),
+    )  # fmt: skip
+    return hinge
+
+
+def curve_elements(constraints: Iterable[Constraint]) -> dict[Key, Element]:
+    """Elements of the hinges along curves, evaluated by the tape interpreter."""
+    curves = [constraint for constraint in constraints if constraint.curve is not None]
+    return {("hinge", _type_name(curve)): _element(curve) for curve in curves}
+
+
+def _element(constraint: Constraint) -> Element:
+    kernel, name = _kernel(constraint), _type_name(constraint)
+    derivatives = differentiate(kernel, ("q", "u"), None, values=False, guards=False)
+    spec = ElementSpec("hinge", name, _TITLE, (_S,), (_RATE,), (), (kernel,))
+    return Element(
+        "hinge", name, 1, 1, (), {}, {}, None, compile_tape(kernel), compile_tape(derivatives),
+        hash=spec.hash(), spec=spec,
+    )  # fmt: skip
+
+
+def _type_name(constraint: Constraint) -> str:
+    return f"{constraint.name}/curve"
+
+
+def _kernel(constraint: Constraint) -> KernelIR:
+    """Kernel of a hinge that translates along c(s): d = c, H = c', bias acceleration c'' s'^2."""
+    graph = Graph()
+    s, rate = graph.element("q", 0), graph.element("u", 0)
+    zero, unit = graph.constant(0), graph.constant(1)
+    assert constraint.curve is not None
+    position, first, second = zip(
+        *(motion(entry, s, lambda _: s) for entry in constraint.curve), strict=True
+    )
+    no_rotation = [zero] * 3
+    values: dict[str, object] = {
+        "R": [[unit if i == j else zero for j in range(3)] for i in range(3)],
+        "d": list(position), "H": [*first, *no_rotation], "v": [rate * x for x in first],
+        "w": no_rotation, "c": [*(rate * rate * x for x in second), *no_rotation], "qdot": [rate],
+    }  # fmt: skip
+    inputs = [Port("p", (0,)), Port("q", (1,)), Port("u", (1,))]
+    return graph.kernel("hinge", inputs, _OUTPUTS, values, purpose=_TITLE)
+
+
+# --- spanning tree --------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Cut:
+    """Closure of a loop, by names.
+
+    Attributes:
+        hinge: cut hinge, or the hinge that carries the frame of a constraint.
+        frame: massless body outboard of the hinge.
+        body: body that the frame must coincide with; an end of it if it is flexible.
+        constraint: None for a cut hinge.
+    """
+
+    hinge: str
+    frame: str
+    body: str
+    constraint: Constraint | None = None
+
+
+def cut_loops(scene: Scene) -> tuple[Scene, tuple[Cut, ...]]:
+    """Scene with a tree topology, and the closures: cut hinges, then constraints."""
+    if not may_have_loops(scene):
+        return scene, ()
+    plan = build_topology(scene.skeleton).plan
+    if plan is None or not (plan.cut or scene.constraint):
+        return scene, ()
+    tables, bodies, cuts = list(scene.hinge), list(scene.body), list[Cut]()
+    flexible = {body.name for body in (*scene.beam, *scene.elastic)}
+    for number in plan.cut:
+        hinge = tables[number]
+        end, name = hinge.outboard_end, f"{hinge.name}/cut"
+        cut, ends = Cut(hinge.name, name, hinge.outboard_body), dict[str, End]()
+        if cut.body in flexible:
+            cut, end = replace(cut, body=hinge.outboard), ""
+        else:
+            ends = scene.bodies.by_name[cut.body].ends
+        update = {"outboard": f"{name}.{end}" if end else name, "cut": None}
+        tables[number] = hinge.model_copy(update=update)
+        bodies.append(_frame(cut.frame, ends))
+        cuts.append(cut)
+    for constraint in scene.constraint:
+        hinge = _frame_hinge(constraint)
+        tables.append(hinge)
+        bodies.append(_frame(hinge.outboard, {}))
+        cuts.append(Cut(hinge.name, hinge.outboard, split_reference(constraint.to)[0], constraint))
+    fields = {name: getattr(scene, name) for name in type(scene).model_fields}
+    fields |= {"body": tuple(bodies), "hinge": tuple(tables), "constraint": ()}
+    return Scene.model_construct(**fields), tuple(cuts)
+
+
+def _frame_hinge(constraint: Constraint) -> Hinge:
+    """Hinge between the end `from` of a constraint and its frame, with a reserved name.
+
+    It is a weld, with z along the normal if there is one; of a point on a curve it moves along it.
+    """
+    name, normal = f"{constraint.name}{OF_CONSTRAINT}", constraint.unit_normal
+    axes = IDENTITY if normal is None else axes_about(normal, None)
+    weld = Hinge(name="frame", type="fixed", inboard=GROUND, outboard="frame",
+                 orientation=to_quaternion(axes))  # fmt: skip
+    on_ground = split_reference(constraint.from_)[0] == GROUND
+    weld = weld.model_copy(update={
+        "name": name, "inboard": constraint.from_, "outboard": f"{name}/frame",
+        "position": constraint.position if on_ground else (0.0, 0.0, 0.0),
+    })  # fmt: skip
+    return curve_hinge(constraint, weld) if constraint.type == CURVE else weld
+
+
+def _frame(name: str, ends: Mapping[str, End]) -> Body:
+    return Body(name="frame", mass=0.0).model_copy(update={"name": name, "ends": ends})
+
+
+# --- flexible bodies ------------------------------------------------------------------------------
 
 HELD, POINT = "held", "point"
 
@@ -222,6 +381,3 @@ class _Expansion:
         weld = Hinge(name="weld", type="fixed", inboard="ground", outboard="frame")
         update = {"name": name, "inboard": inboard, "outboard": outboard}
         self.internal.append(weld.model_copy(update=update))
-
-
-__all__ = ["ExpandedScene", "Passage", "expand"]

@@ -1,1 +1,0 @@
-"""Expansion of flexible bodies into nodes of the tree, or their replacement by rigid bodies."""

@@ -1,1 +1,0 @@
-"""Simplifications that do not change the motion: merged bodies, exact right angles."""
