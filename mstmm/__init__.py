@@ -31,11 +31,10 @@ from .version import __version__ as __version__
 
 if TYPE_CHECKING:
     from .atlas.atlas import Atlas, stability
-    from .pipeline.advise import advise
-    from .pipeline.chart import chart
     from .pipeline.compilation import compile_scene as compile
     from .pipeline.compilation import generate_file, register
     from .pipeline.equations import equations
+    from .pipeline.experiments import advise, chart
     from .pipeline.report.report import write_report
     from .runtime.experiments.chart.chart import Chart
     from .runtime.experiments.model_reduction.advice import Advice
@@ -54,8 +53,8 @@ _LAZY = {
     "load_scene": (".scene.load", "load_scene"),
     "import_robot": (".scene.load", "import_robot"),
     "export_robot": (".scene.robots.robot_from_scene", "export_robot"),
-    "advise": (".pipeline.advise", "advise"),
-    "chart": (".pipeline.chart", "chart"),
+    "advise": (".pipeline.experiments", "advise"),
+    "chart": (".pipeline.experiments", "chart"),
     "compile": (".pipeline.compilation", "compile_scene"),
     "register": (".pipeline.compilation", "register"),
     "equations": (".pipeline.equations", "equations"),

@@ -2,27 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mstmm.array_validation import Array
 from mstmm.display import abbreviate_names
-from mstmm.errors import NumericalFailure
-from mstmm.risk import AssessedResult, DeferredRisks, Risk
+from mstmm.errors import MstmmError, NumericalFailure, SceneError
+from mstmm.risk import AssessedResult, DeferredRisks, Risk, information
 
+from ..discontinuities.active_expressions import active_expressions
 from ..engine.compiled_scene import scene_length, speed_scales
 from ..engine.looped_engine import Probe
 from ..engine.pseudo_transient_equilibrium import MAX_STEPS
 from ..engine.static_equilibrium import EquilibriumNotFoundError, UndeterminedEquilibriumError
+from ..linear.operating_point.departure import find_departure
+from ..linear.operating_point.later_states import LaterStates
+from ..linear.validity import departure_risk
 from ..risk_checks.state_risks import find_state_risks
 from ..run.scene_system import SceneSystem
 from .equilibrium_search import MAX_INDEPENDENT, EquilibriumSearch, Progress
-from .full_turns import remove_full_turns
 
 if TYPE_CHECKING:
     from ..engine.compiled_scene import CompiledScene
+    from ..linear.linear_model import Linear
 
 
 #: Largest number of efforts that a message lists.
@@ -206,3 +210,126 @@ def _list_largest_efforts(model: CompiledScene, failure: EquilibriumNotFoundErro
     listed = [f"{residual[k]:.3g} along {name}" for k, name in zip(order, names, strict=True)]
     others = len(residual) - len(listed)
     return ", ".join(listed) + " (N or N*m)" + (f" and {others} smaller" if others > 0 else "")
+
+
+# --- removal of full turns that have no effect ----------------------------------------------------
+
+_TURN = 2 * np.pi
+#: Relative change due to rounding when a full turn without effect is removed.
+_TOLERANCE = 1e-9
+
+
+def remove_full_turns(model: CompiledScene, start: Array, q: Array, t: float) -> Array:
+    """q (nq,) with hinge angles within half a turn of the `start` (nq,), without effect.
+
+    A full turn is removed only if all bodies keep their poses, all efforts their values, and no
+    expression, output or controller of the scene reads the angle.
+    """
+    for place in _wound_coordinates(model, start, q):
+        unwound = q.copy()
+        unwound[place] -= _TURN * round((q[place] - start[place]) / _TURN)
+        if _has_same_effect(model, q, unwound, t):
+            q = unwound
+    return q
+
+
+def _wound_coordinates(model: CompiledScene, start: Array, q: Array) -> Iterator[int]:
+    """Indices in q of angles more than half a turn from the start that nothing reads by name."""
+    free, referenced = set(model.free_speed_indices), None
+    for name, slots in model.coordinate_layout.hinges.items():
+        if not slots.nu or not slots.rates_are_speeds:
+            continue
+        for k, unit in enumerate(slots.u_units):
+            index = slots.q + k
+            is_wound = abs(q[index] - start[index]) > _TURN / 2
+            if not is_wound or unit != "rad/s" or slots.u + k not in free:
+                continue
+            referenced = _referenced_hinges(model) if referenced is None else referenced
+            if name not in referenced:
+                yield index
+
+
+def _referenced_hinges(model: CompiledScene) -> set[str]:
+    """Names of hinges whose coordinates an expression, output or controller reads."""
+    scene, names_read = model.scene, set[str]()
+    for active in active_expressions(scene):
+        names_read |= {name.text.rpartition(".")[0] for name in active.expression.names}
+        names_read |= {scene.hinges[number].name for number in active.hinges}
+    texts = [repr(x) for x in (*scene.output, *scene.controller, *scene.coupling)]
+    names = model.coordinate_layout.hinges
+    return names_read | {name for name in names if any(f"{name}." in text for text in texts)}
+
+
+def _has_same_effect(model: CompiledScene, q: Array, unwound: Array, t: float) -> bool:
+    engine, zeros = model.looped, np.zeros(model.nu)
+    memory = engine.start_memory()
+    probes = [Probe(i, _AXES, (0.0, 0.0, 0.0)) for i in range(engine.packed.topology.count)]
+    observed = []
+    for state in (q, unwound):
+        try:
+            state = SceneSystem(engine).start(t, state, zeros)[: model.nq]
+            efforts = engine.inverse_dynamics(t, state, zeros, zeros, memory)
+        except MstmmError:
+            return False
+        points = engine.observe(np.array([t]), state[None], zeros[None], memory[None], probes,
+                               ("points",)).points  # fmt: skip
+        observed.append((efforts, points[0, :, :3], points[0, :, 15:24], state))
+    correction = np.abs(observed[1][3] - unwound).max(initial=0.0)
+    return bool(correction <= _TOLERANCE) and all(
+        np.abs(a - b).max(initial=0.0) <= _TOLERANCE * max(1.0, float(np.abs(a).max(initial=0.0)))
+        for a, b in zip(observed[0][:3], observed[1][:3], strict=True)
+    )
+
+
+# --- whether an equilibrium lasts while drives move and loads change ------------------------------
+
+
+def with_persistence_findings(
+    model: CompiledScene, equilibrium: Equilibrium, t: float, linearise: Callable[[], Linear]
+) -> Equilibrium:
+    """Equilibrium at t (s), with a finding if it does not last.
+
+    `linearise` returns the linear model about it.  Raises NumericalFailure if moving drives do not
+    keep it at rest.
+    """
+    if model.packed_scene.system.is_autonomous or not len(equilibrium.residuals):
+        return equilibrium
+    earlier = equilibrium.findings
+    if not _drives_move(model, equilibrium, t):
+        equilibrium.findings = DeferredRisks(lambda: (*earlier, *_risks(t, linearise)))
+        return equilibrium
+    risks = tuple(_risks(t, linearise))
+    for risk in risks:
+        if risk.invalidates:
+            raise NumericalFailure(
+                f"no equilibrium: {risk.description}; simulate the motion, or stop the drives"
+            )
+    equilibrium.findings = (*earlier, *risks)
+    return equilibrium
+
+
+def _drives_move(model: CompiledScene, equilibrium: Equilibrium, t: float) -> bool:
+    """Whether any drive has a speed or an acceleration at t (s)."""
+    system, engine = model.packed_scene.system, model.looped
+    y = SceneSystem(engine).start(t, np.asarray(equilibrium), np.zeros(model.nu))
+    q, u = y[None, : model.nq].copy(), y[None, model.nq : model.nq + model.nu].copy()
+    _, a = engine.accelerations(t, q, u, engine.start_memory()[None])
+    first = system.first_indices["u"]
+    driven = [int(first[place]) + k for place, k in system.driven]
+    return bool(u[0, driven].any() or a[0, driven].any())
+
+
+def _risks(t: float, linearise: Callable[[], Linear]) -> Iterator[Risk]:
+    """Risk of a departure from the equilibrium, now or later."""
+    try:
+        linear = linearise()
+        later = LaterStates(linear)
+        departure = find_departure(linear, later)
+    except (SceneError, NumericalFailure) as failure:
+        yield information(
+            "unexamined", "the state", f"not examined whether it lasts: {failure}",
+            "simulate from this state",
+        )  # fmt: skip
+        return
+    if departure is not None:
+        yield departure_risk(t, departure, later.cause)

@@ -150,7 +150,7 @@ class Model(LinearAnalysis, SimulatedScene, PublicMembers, NotebookDisplay):
 
     def check_start_determined(self) -> None:
         """Raise SceneError, naming the hinges, if motions at the start have no inertia."""
-        from .undetermined_start import check_start_determined
+        from .assembly import check_start_determined
 
         check_start_determined(self, *self.initial_state())
 
@@ -190,8 +190,7 @@ class Model(LinearAnalysis, SimulatedScene, PublicMembers, NotebookDisplay):
         there is no equilibrium near the start, or none at all; and where moving drives do not keep
         the state at rest.
         """
-        from .equilibrium import equilibrium
-        from .equilibrium_persistence import with_persistence_findings
+        from .equilibrium import equilibrium, with_persistence_findings
 
         remedy = "call equilibrium for each of several"
         start = self.initial_state()[0] if q is None else single_state("q", q, self.nq, remedy)
