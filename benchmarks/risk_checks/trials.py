@@ -13,8 +13,9 @@ import mstmm
 from mstmm.risk import Risk
 from mstmm.runtime.experiments.error_measure import Coordinates
 from mstmm.runtime.integrate.settings import Settings
+from mstmm.runtime.result.checks.check import RunStart
+from mstmm.runtime.result.checks.run_checks import check_before_run
 from mstmm.runtime.result.result import Result
-from mstmm.runtime.risk_checks.pre_run import check_before_run
 
 Scene = dict[str, Any]
 
@@ -56,9 +57,10 @@ def run_trial(tested: mstmm.Model, t_end: float, **settings: Any) -> tuple[Resul
     """A run and the names of the risks reported before it."""
     q, u = settings.get("initial") or tested.initial_state()
     method_settings = {key: value for key, value in settings.items() if key in ("method", "step")}
-    reported = check_before_run(
+    start = RunStart(
         tested, Settings(t_end, **method_settings), np.asarray(q, float), np.asarray(u, float)
-    ).risks
+    )
+    reported = check_before_run(start).risks
     run = tested.simulate(t_end, **settings)
     return run, unique_names((*reported, *(risk for risk in run.risks if risk.seen_before_run)))
 

@@ -9,8 +9,8 @@ from mstmm.plain_data import stored_keys, to_plain
 from mstmm.risk import to_rows
 
 if TYPE_CHECKING:
+    from mstmm.runtime.result.certificate import Verdict
     from mstmm.runtime.result.result import Result
-    from mstmm.runtime.result.verdict import Verdict
 
 #: Largest number of time spans with one method that are listed individually.
 _MAX_LISTED_SPANS = 6
@@ -140,13 +140,12 @@ def to_json(result: Result, seconds: float, verdict: Verdict) -> dict[str, Any]:
 def _certificate_data(result: Result) -> dict[str, Any]:
     """Certificate as plain data; the estimated error by unit."""
     certificate = result.certificate
-    excluded = ("error", "reached", "models", "known", "control")  # reported elsewhere
+    excluded = ("error", "reached", "control")  # reported elsewhere
     plain = {
         key: to_plain(getattr(certificate, name))
         for name, key in stored_keys(certificate).items()
         if key not in excluded
     }
-    plain["risks"] = to_rows(certificate.risks)
     error = certificate.error
     if error is None:
         return {**plain, "error": None}

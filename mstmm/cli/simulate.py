@@ -31,8 +31,8 @@ from .terminal_output import print_error, print_json, print_lines, table_console
 
 if TYPE_CHECKING:
     from mstmm.runtime.model.model import Model
+    from mstmm.runtime.result.certificate import Verdict
     from mstmm.runtime.result.result import Result
-    from mstmm.runtime.result.verdict import Verdict
 
 #: Duration (s) up to which a run is followed by a second one that estimates its error.
 MAX_SHORT_RUN = 2.0

@@ -148,7 +148,7 @@ def compile_level(
 
 def _model_with_accurate_sweep(made: Callable[[str], Model], engine: str) -> Model:
     """Model with the cheapest sweep that is accurate at the start and that the scene supports."""
-    from ..runtime.risk_checks.mass_ratio import accurate_sweep
+    from ..runtime.result.checks.conditioning import accurate_sweep
 
     model = made("riccati")
     needed_sweep = accurate_sweep(model)

@@ -10,10 +10,11 @@ from mstmm.array_validation import Array
 
 from ..engine.compiled_scene import CompiledScene
 from ..integrate.settings import Settings
+from ..result.checks.answer_checks import apply_policy, check_start
+from ..result.checks.check import RunStart
+from ..result.checks.run_checks import PreRunFindings
 from ..result.factory import result_of
 from ..result.result import Result
-from ..risk_checks.pre_run import PreRunFindings
-from ..risk_checks.risk_policy import apply_policy, check_start
 from ..run.checkpoint import Checkpoint
 from ..run.run_execution import RunMonitor, first_run, second_run
 from .error_control.tolerance_search import ToleranceSearch
@@ -35,7 +36,7 @@ def simulate(
     With `certify` its error is estimated by a second run.  Unless the user `named` the method, a
     run by `auto` that keeps to its first method is recorded as one by that method.
     """
-    seen = check_start(model, settings, *state, execution.on_risk)
+    seen = check_start(RunStart(model, settings, *state), execution.on_risk)
     if request is None:
         result = _run(model, settings, state, seen, execution, certify, named)
     else:
@@ -61,7 +62,7 @@ def _run(
         path = require_path("checkpoint", execution.checkpoint)
         monitor.checkpoint = Checkpoint(path, model, settings, *state)
     run = first_run(model, settings, *state, monitor, execution.resume)
-    run = seen.attach_to(run, *state)
+    run = seen.attach_to(run)
     error = second_run(model, run, *state, monitor) if certify and run.is_comparable else None
     if monitor.notes:
         run = replace(run, notes=(*run.notes, *monitor.notes))

@@ -22,7 +22,7 @@ from mstmm.risk import AssessedResult, DeferredRisks, Risk
 
 from ..engine.compiled_scene import speed_scales
 from ..engine.tangent_matrix import HarmonicResponse
-from ..risk_checks.shape_range import response_range_risks
+from ..result.checks.shape_range import response_range_risks
 from . import file_formats
 from .harmonic.damping_checks import (
     check_state_at_rest,

@@ -17,7 +17,7 @@ from mstmm.errors import SceneError
 from mstmm.risk import AssessedResult, Risk, information
 
 from ..engine.compiled_scene import scene_length
-from ..risk_checks.shape_range import motion_range_risks, shape_limits
+from ..result.checks.shape_range import motion_range_risks, shape_limits
 from . import energy_shares, file_formats
 from .rotors.displacements import whirl
 from .rotors.fixed_frame import frame_of

@@ -21,7 +21,7 @@ from mstmm.array_validation import Array, Integers, finite_array
 from mstmm.errors import NumericalFailure, SceneError
 from mstmm.risk import RUN, AssessedResult, DeferredRisks, Risk
 
-from ..risk_checks.state_risks import merge_over_values
+from ..result.checks.answer_checks import merge_over_values
 from . import file_formats
 from .modes import Complex, Modes
 

@@ -12,7 +12,7 @@ from mstmm.array_validation import Array
 from mstmm.display import abbreviate_names
 from mstmm.risk import RUN, Risk, information
 
-from ..risk_checks.state_risks import find_state_risks
+from ..result.checks.answer_checks import find_state_risks
 from .input_channels import GROUND, Channel
 from .mode_solvers import modes
 from .modes import INPUT_RISKS, OUTPUT_LEFT_OUT

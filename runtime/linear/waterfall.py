@@ -15,7 +15,7 @@ from mstmm.array_validation import Array
 from mstmm.errors import SceneError
 from mstmm.risk import AssessedResult, DeferredRisks, Risk
 
-from ..risk_checks.state_risks import merge_over_values
+from ..result.checks.answer_checks import merge_over_values
 from . import file_formats
 from .frequency_response import frequency_response
 from .modes import Complex

@@ -16,7 +16,7 @@ from ..engine.compiled_scene import CompiledScene
 from ..engine.loops.loop_analysis import LoopStart
 from ..engine.loops.loop_calls import LoopCalls
 from ..packing.records.model_record import trial_rotors
-from ..risk_checks.state_risks import find_state_risks
+from ..result.checks.answer_checks import find_state_risks
 
 if TYPE_CHECKING:
     from ..engine.compiled_scene import CompiledScene

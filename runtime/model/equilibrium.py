@@ -20,7 +20,7 @@ from ..engine.static_equilibrium import EquilibriumNotFoundError, UndeterminedEq
 from ..linear.operating_point.departure import find_departure
 from ..linear.operating_point.later_states import LaterStates
 from ..linear.validity import departure_risk
-from ..risk_checks.state_risks import find_state_risks
+from ..result.checks.answer_checks import find_state_risks
 from ..run.scene_system import SceneSystem
 from .equilibrium_search import MAX_INDEPENDENT, EquilibriumSearch, Progress
 

@@ -1,27 +1,60 @@
-"""Certificate of a run: balances, conditioning, estimated error and verdict."""
+"""Certificate of a run: measures, estimated error and verdict."""
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
-from functools import cached_property
 
 from mstmm.array_validation import finite_float
 from mstmm.display import NotebookDisplay, table
 from mstmm.plain_data import stored_as
-from mstmm.risk import Risk, order_risks, sentences
+from mstmm.risk import Risk, sentences
 
 from ..integrate.achieved_error import AchievedError
 from ..run.error_estimate import ANGLE, PART, ErrorEstimate, error_limit
 from ..run.step_stability import StepCheck
-from .certificate_data import Drift, SpringDeflection
-from .conditioning import MAX_CHECKED_BODIES, PivotLoss, SingularDistance
+from .certificate_data import (
+    DEFAULT_ACCURACY,
+    MAX_CHECKED_BODIES,
+    Closure,
+    Drift,
+    PivotLoss,
+    SingularDistance,
+    SpringDeflection,
+    StepControl,
+)
 from .flexible import model_range
-from .flexible import risks as flexible_risks
 from .flexible.model_range import ModelRange
-from .loop_closure_error import Closure
-from .result_risks import balance_risks, finiteness_risks, misfit_risks, quaternion_risks
-from .step_control import StepControl
-from .verdict import DEFAULT_ACCURACY, Verdict
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Verdict on a result within given bounds.
+
+    Attributes:
+        objections: objections, one sentence each.
+        unchecked: what was not checked.
+        bounds: the requested bounds, in words.
+    """
+
+    objections: tuple[str, ...]
+    unchecked: tuple[str, ...]
+    bounds: str
+
+    @property
+    def trusted(self) -> bool:
+        """Whether everything was checked and there is no objection."""
+        return not self.objections and not self.unchecked
+
+    def __str__(self) -> str:
+        if self.objections:
+            other_count = len(self.objections) - 1
+            remainder = f" (and {other_count} more, see below)" if other_count else ""
+            first_clause = re.split(r";|(?<=\)): |: split ", self.objections[0])[0]
+            return f"NOT trusted: {first_clause}{remainder}"
+        if self.unchecked:
+            return f"not verified: {'; '.join(self.unchecked)}; no check objects"
+        return f"trusted: {self.bounds}, all models within their validity range"
 
 
 @dataclass(frozen=True)
@@ -51,12 +84,10 @@ class Certificate(NotebookDisplay):
         spring_deflection: deflection of the stiffest spring, which the estimated error does not
             include; None without a spring.
         failures: reasons why the run, or some of its samples, cannot be used at all.
-        model_risks: findings about models of the scene outside their range in any run.
-        prior_risks: findings about the scene and its start before the run, and those of the run
-            itself.
         achieved_error: achieved error for a target error (error=...); None without a target.
         loop_closure: loop closure error, and the number of indeterminate reactions; None for trees.
         step_control: step control, which determines the expected drift of the balances.
+        risks: findings about the run, objections first; empty for a clean run.
     """
 
     energy: Drift
@@ -77,10 +108,9 @@ class Certificate(NotebookDisplay):
     flexible_bodies: tuple[ModelRange, ...] = field(default=(), metadata=stored_as("flexible"))
     spring_deflection: SpringDeflection | None = field(default=None, metadata=stored_as("give"))
     failures: tuple[str, ...] = ()
-    model_risks: tuple[Risk, ...] = field(default=(), metadata=stored_as("models"))
-    prior_risks: tuple[Risk, ...] = field(default=(), metadata=stored_as("known"))
     achieved_error: AchievedError | None = field(default=None, metadata=stored_as("reached"))
     loop_closure: Closure | None = field(default=None, metadata=stored_as("closure"))
+    risks: tuple[Risk, ...] = ()
 
     def verdict(self, accuracy: float = DEFAULT_ACCURACY, balance: float | None = None) -> Verdict:
         """Verdict on whether the result can be used.
@@ -96,29 +126,6 @@ class Certificate(NotebookDisplay):
     def trusted(self) -> bool:
         """Whether balances, error and models were checked and stay within bounds."""
         return self.verdict().trusted
-
-    @cached_property
-    def risks(self) -> tuple[Risk, ...]:
-        """Findings about the run, objections first; empty for a clean run."""
-        pivot, singular = self.pivot_loss, self.singularity_distance
-        if pivot and singular and singular.risk and pivot.hinge == singular.hinge:
-            pivot = None  # the pivot vanishes at a singularity
-        is_too_long_at_start = (
-            self.step_stability is not None and self.step_stability.risk is not None
-        )
-        checked = (
-            pivot,
-            singular,
-            self.step_stability if is_too_long_at_start else self.later_step_stability,
-        )
-        return order_risks((
-            *finiteness_risks(self.is_finite, self.achieved_error), *self.prior_risks,
-            *misfit_risks(self.loop_closure, self.prior_risks),
-            *balance_risks((self.energy, *self.momentum), self.step_control, self.loop_closure),
-            *quaternion_risks(self.quaternion_drift),
-            *(x.risk for x in checked if x is not None and x.risk is not None),
-            *flexible_risks.flexibility_risks(self.flexible_bodies), *self.model_risks,
-        ))  # fmt: skip
 
     @property
     def objections(self) -> tuple[str, ...]:

@@ -70,7 +70,7 @@ class Result(PublicMembers, Record, NotebookDisplay):
     @cached_property
     def certificate(self) -> Certificate:
         """Quality report of a run: balances, conditioning, estimated error.  Printable."""
-        from .certify import build_certificate
+        from .checks.run_checks import build_certificate
 
         return build_certificate(self, self._error)
 

@@ -61,6 +61,7 @@ class Record(FlexibleResults, ABC):
         self.statistics, self.settings = run.statistics, run.settings
         self._observations = Observations(model, run)
         self._quantities = Quantities(self._observations, self)
+        self._measures: dict[object, Any] = {}  # of checks
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the model, the run and meshes; derived quantities are computed again."""

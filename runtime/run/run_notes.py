@@ -9,11 +9,8 @@ import numpy as np
 from mstmm.risk import RUN, Risk
 
 from ..integrate.steppers import get
-from ..packing.event_functions import MAX_SWITCHES
 
 if TYPE_CHECKING:
-    from ..integrate.settings import Settings
-    from ..packing.packed_scene import PackedScene
     from .scene_system import SceneSystem
     from .trajectory import Trajectory
 
@@ -22,29 +19,6 @@ _MAX_ERROR = 0.02
 
 #: Error of the recommended step, relative to _MAX_ERROR.
 _TARGET = 0.5
-
-
-def unmapped_expression_notes(packed: PackedScene, settings: Settings) -> tuple[Risk, ...]:
-    """Risks of expressions of time that could not be mapped or that a fixed step may miss."""
-    time_map = packed.time_map(settings.t_start, settings.t_end)
-    risks = list(time_map.notes)
-    if settings.step is not None:
-        risks += [risk] if (risk := time_map.missed_feature_risk(settings.step)) else []
-    count = len(packed.event_functions.switches)
-    if count > MAX_SWITCHES:
-        risks.append(
-            Risk(
-                "switches",
-                RUN,
-                f"more than {MAX_SWITCHES} conditions depend on the motion; only the first "
-                f"{MAX_SWITCHES} end a step where they switch",
-                "give max_step so that none is missed",
-                count,
-                MAX_SWITCHES,
-                seen_before_run=True,
-            )
-        )
-    return tuple(risks)
 
 
 def step_too_long_note(run: Trajectory) -> tuple[Risk, ...]:

@@ -21,7 +21,7 @@ from mstmm.errors import MstmmError
 from ...integrate.c_loop import Status
 from ...integrate.settings import Settings
 from ...integrate.steppers import AUTO, AUTO_EXPLICIT, get
-from ...risk_checks.excitation_bandwidth import squared_frequencies
+from ...result.checks.flexible import squared_frequencies
 from ...run import external_integrators
 from ...run.method_switching import implicit_method
 from ...run.spectral_radius import fastest_possible

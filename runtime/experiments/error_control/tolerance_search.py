@@ -42,8 +42,8 @@ from .method_choice import Family, damps_own_errors, is_stability_limited, run_k
 
 if TYPE_CHECKING:
     from ...engine.compiled_scene import CompiledScene
+    from ...result.checks.run_checks import PreRunFindings
     from ...result.result import Result
-    from ...risk_checks.pre_run import PreRunFindings
     from ...run.trajectory import Trajectory
 
 
@@ -153,7 +153,7 @@ class ToleranceSearch:
         """Compared values of a run; for coordinates without creating a result."""
         if not self._request.of:
             return run.q
-        result = result_of(self._model, self._findings.attach_to(run, self._q, self._u))
+        result = result_of(self._model, self._findings.attach_to(run))
         if self._measure is None:
             self._measure = Quantities(result, self._request.of)
         return self._measure.read(result)
@@ -313,7 +313,7 @@ class ToleranceSearch:
 
     def _as_requested(self, run: Trajectory) -> Trajectory:
         """Run with the findings before it, at the output times of the user."""
-        run = self._findings.attach_to(run, self._q, self._u)
+        run = self._findings.attach_to(run)
         times, max_steps = self._times or self._settings.output_times, self._settings.max_steps
         if (times, max_steps) == (run.settings.output_times, run.settings.max_steps):
             return run

@@ -13,7 +13,7 @@ from mstmm.array_validation import finite_float, integer
 from mstmm.errors import MstmmError, SceneError
 
 from ...integrate.steppers import AUTO
-from ...result.flexible.risks import MAX_SLOPE
+from ...result.checks.flexible import MAX_SLOPE
 from ..budget import Budget
 from ..error_measure import PositionMeasure
 from ..model_levels import with_model_level

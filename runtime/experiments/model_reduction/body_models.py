@@ -15,8 +15,8 @@ from mstmm.scene.tables.beam import DIRECTIONS, Beam, Modes
 from mstmm.scene.tables.elastic import Elastic
 
 from ...packing.rigid_substitution import LEVELS
+from ...result.checks.flexible import MAX_LOAD_RATIO
 from ...result.flexible.model_range import ModelRange
-from ...result.flexible.risks import MAX_LOAD_RATIO
 from ...result.one_way.response import rigidified_bodies
 from ...result.one_way.result import OneWayResult
 from ..model_levels import beam_modes, vibration_mode_count, with_mode_counts, with_tables

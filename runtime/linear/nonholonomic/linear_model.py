@@ -27,7 +27,7 @@ from mstmm.errors import NumericalFailure, SceneError
 from mstmm.risk import RUN, DeferredRisks, Risk
 
 from ...engine.compiled_scene import speed_scales
-from ...risk_checks.state_risks import find_state_risks
+from ...result.checks.answer_checks import find_state_risks
 from ...run.scene_system import SceneSystem
 from .. import energy_shares
 from ..frequency_response import FrequencyResponse, angular_frequencies, select_inputs

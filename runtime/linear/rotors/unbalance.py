@@ -16,7 +16,7 @@ from mstmm.errors import SceneError
 from mstmm.risk import AssessedResult, DeferredRisks, Risk
 
 from ...engine.quantity_registry import BodyReferences
-from ...risk_checks.state_risks import merge_over_values
+from ...result.checks.answer_checks import merge_over_values
 from .. import file_formats
 from .displacements import angular_velocity
 

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from mstmm.risk import Risk
+from mstmm.runtime.result.checks.flexible import FLEXIBILITY_CHECKS, MODEL_RANGE
 from mstmm.runtime.result.flexible import model_range, range_estimators
 from mstmm.runtime.result.flexible.modal_energy import (
     modal_energy,
@@ -17,7 +21,6 @@ from mstmm.runtime.result.flexible.modal_energy import (
 )
 from mstmm.runtime.result.flexible.modal_participation import participation
 from mstmm.runtime.result.flexible.model_range import ModelRange, missed_bending_energy
-from mstmm.runtime.result.flexible.risks import flexibility_risks
 from tests.support.flexible.beam_motions import (
     EI_Y,
     EI_Z,
@@ -179,6 +182,12 @@ def test_shear_counts_as_much_as_its_shape_moves() -> None:
 
 
 # --- warnings -------------------------------------------------------------------------------------
+
+
+def flexibility_risks(ranges: Sequence[ModelRange]) -> list[Risk]:
+    """Risks of a result with these ranges of its flexible bodies."""
+    result: Any = SimpleNamespace(_measures={MODEL_RANGE: tuple(ranges)})
+    return [risk for check in FLEXIBILITY_CHECKS for risk in check.after(result)]
 
 
 @pytest.mark.parametrize(

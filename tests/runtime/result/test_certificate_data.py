@@ -9,7 +9,7 @@ import pytest
 
 import mstmm
 from mstmm.risk import Risk
-from mstmm.runtime.result.step_control import MAX_DRIFT, StepControl
+from mstmm.runtime.result.certificate_data import MAX_DRIFT, StepControl
 from tests.support.scenes.results import motor, pins
 
 

@@ -11,7 +11,7 @@ feature, the run is repeated once to record them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import chain, islice
 from typing import TYPE_CHECKING
@@ -22,23 +22,25 @@ from mstmm.array_validation import Array
 from mstmm.expression.expression import Expression, Name
 from mstmm.risk import Risk
 
-from ..discontinuities.active_expressions import (
+from ...discontinuities.active_expressions import (
     ActiveExpression,
     active_expressions,
     examined_hinges,
 )
-from ..discontinuities.expression_functions import ExpressionFunctions
-from ..discontinuities.interval_arithmetic import Interval
-from ..discontinuities.interval_enclosures import TIME, Enclosure
-from ..discontinuities.step_limits import CELLS_PER_STEP, StepLimits, WatchedFunction, step_limits
-from ..run.run_execution import RunMonitor, first_run
-from .sources.paths import RunStates, SampledVariable, make_enclosures, sampled_variables
+from ...discontinuities.expression_functions import ExpressionFunctions
+from ...discontinuities.interval_arithmetic import Interval
+from ...discontinuities.interval_enclosures import TIME, Enclosure
+from ...discontinuities.step_limits import CELLS_PER_STEP, StepLimits, WatchedFunction, step_limits
+from ...run.run_execution import RunMonitor, first_run
+from ..sources.paths import RunStates, SampledVariable, make_enclosures, sampled_variables
+from .check import Check
 
 if TYPE_CHECKING:
     from mstmm.scene import Hinge
 
-    from ..engine.compiled_scene import CompiledScene
-    from ..run.trajectory import Trajectory
+    from ...engine.compiled_scene import CompiledScene
+    from ...run.trajectory import Trajectory
+    from ..result_record import Record
 
 #: Least height of a peak, relative to the range of the function.
 _MIN_PEAK_RATIO = 0.1
@@ -79,6 +81,14 @@ class _SampledPath:
     step_distances: Array
     unit: str
     ranges: Mapping[int, float] = field(default_factory=dict)
+
+
+class NarrowFeatureCheck(Check):
+    """Narrow features of forces that the steps of a run missed."""
+
+    def after(self, result: Record) -> Iterable[Risk]:
+        """Risks of expressions with such features."""
+        return missed_feature_risks(result.model, result.trajectory)
 
 
 def missed_feature_risks(model: CompiledScene, run: Trajectory) -> tuple[Risk, ...]:

@@ -1,4 +1,4 @@
-"""Conditioning of a run: pivots of the sweep and singular angles.
+"""Conditioning: pivots of the sweep and singular angles, before and after a run.
 
 The sweep passes S - S H D^-1 H^T S inwards: the inertia S outboard of the hinge without the part
 along its motion, D = H^T S H + J_rotor. Where the next pivot D is small compared with the
@@ -9,32 +9,32 @@ accelerations is about 1e-16 times the propagated rounding in D over D.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mstmm.array_validation import Array
-from mstmm.plain_data import stored_as
 from mstmm.risk import Risk
 
-from .flexible.modal_pivots import ModalPivots
+from ...integrate.settings import Settings
+from ...packing.coordinate_layout import start_values
+from ..certificate_data import MAX_CHECKED_BODIES, MAX_PIVOT_LOSS, PivotLoss, SingularDistance
+from ..flexible.modal_pivots import ModalPivots
+from .check import MeasuringCheck, RunStart, risks_of
 
 if TYPE_CHECKING:
-    from ..engine.compiled_scene import CompiledScene
-    from ..run.trajectory import Trajectory
+    from mstmm.scene import Scene
+
+    from ...engine.compiled_scene import CompiledScene
+    from ...run.trajectory import Trajectory
+    from ..result_record import Record
 
 
-#: Pivot loss and singularity measure that are reported as risks.
-MAX_PIVOT_LOSS, MIN_SINGULAR_MEASURE = 1e8, 1e-4
-#: Pivot loss up to which refined accelerations keep their digits.
-MAX_REFINED_LOSS = 1e13
-
-#: Singularity measure below which a change of angles within a fixed step (rad) is a risk, and the
-#: limit of this change.
-NEAR_SINGULAR_MEASURE, MAX_STEP_ANGLE = 0.1, 0.3
+#: Largest ratio of the loss to the ratio of masses, or of moments of inertia, and largest number of
+#: bodies that are checked before a run; more would take longer than typical runs.
+_MAX_LOSS_PER_RATIO, _MAX_BODIES = 1e3, 2000
 
 #: Maximum number of samples at which the pivots are checked.
 MAX_PIVOT_SAMPLES = 12
@@ -42,89 +42,62 @@ MAX_PIVOT_SAMPLES = 12
 #: Limit of bodies times samples of this check; at least one sample is checked.
 _MAX_BODY_SAMPLES = 20_000
 
-#: Larger scenes are not checked: the check would take longer than the run.
-MAX_CHECKED_BODIES = 200_000
-
 _UPPER_TRIANGLE = np.triu_indices(6)
 
 
-@dataclass(frozen=True)
-class PivotLoss:
-    """Largest ratio of rounding (in units of 1e-16) to pivot in a run.
-
-    With its hinge, its time (s), and the number of refinements of the accelerations.
-    """
-
-    ratio: float
-    hinge: str
-    time: float
-    is_refined: int = field(default=0, metadata=stored_as("refines"))
-
-    @property
-    def error(self) -> float:
-        """Relative error of the accelerations; each refinement multiplies it by the initial one."""
-        return min(1e-16 * self.ratio, 1.0) ** (1 + self.is_refined)
-
-    @property
-    def sweep(self) -> str:
-        """Name of the sweep that avoids this loss of digits."""
-        return "qr" if self.is_refined or self.ratio > MAX_REFINED_LOSS else "refined"
-
-    @property
-    def risk(self) -> Risk | None:
-        """Finding that digits are lost; None for a loss up to `MAX_PIVOT_LOSS`."""
-        if not self.error > 1e-16 * MAX_PIVOT_LOSS:
-            return None
-        refined = f" after {self.is_refined} refinements" if self.is_refined else ""
-        return Risk(
-            "pivot-loss", f'hinge "{self.hinge}"',
-            f'hinge "{self.hinge}": mass ratio {self.ratio:.0e}, heavy body outboard of light '
-            f"ones: relative error of accelerations up to {self.error:.0e}{refined}",
-            f'use sweep = "{self.sweep}" (explicit methods); or, if the root is free, make the '
-            "heavy body the first one", self.ratio, MAX_PIVOT_LOSS,
-        )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class SingularDistance:
-    """Smallest singularity measure of a hinge, and its rotation within a fixed step.
-
-    The coordinates fail where the measure vanishes (gimbal: |cos|). The rotation is in rad, 0 for
-    adaptive steps.
-    """
-
-    measure: float
-    hinge: str
-    time: float
-    rotation_per_step: float = field(default=0.0, metadata=stored_as("turned"))
-
-    @property
-    def risk(self) -> Risk | None:
-        """Finding on a coordinate singularity or on fixed steps too long near one; else None."""
-        approach = (
-            f'hinge "{self.hinge}" comes within {self.measure:.0e} of the singularity of its '
-            f"coordinates, at about t = {self.time:.4g} s"
-        )
-        if self.measure < MIN_SINGULAR_MEASURE:
-            return Risk(
-                "gimbal",
-                f'hinge "{self.hinge}"',
-                approach,
-                "use a ball hinge",
-                self.measure,
-                MIN_SINGULAR_MEASURE,
-            )
-        if self.measure < NEAR_SINGULAR_MEASURE and self.rotation_per_step > MAX_STEP_ANGLE:
-            return Risk(
-                "gimbal", f'hinge "{self.hinge}"',
-                f"{approach}, where its angles change by {self.rotation_per_step:.2g} rad per step",
-                "use a ball hinge, or an adaptive method",
-                self.rotation_per_step, MAX_STEP_ANGLE, "rad",
-            )  # fmt: skip
-        return None
-
-
 # --- pivots ---------------------------------------------------------------------------------------
+
+
+class PivotLossCheck(MeasuringCheck[PivotLoss | None]):
+    """Loss of digits in the sweep: heavy bodies outboard of light ones."""
+
+    def before(self, start: RunStart) -> Iterator[Risk]:
+        """Risk of the largest loss at the start, where masses differ very much."""
+        if _may_lose_digits(start.model):
+            yield from risks_of(pivot_loss(start.model, start.state), before=True)
+
+    def measure(self, result: Record) -> PivotLoss | None:
+        """Largest loss over samples of the run."""
+        return pivot_loss(result.model, result.trajectory)
+
+    def after(self, result: Record) -> Iterator[Risk]:
+        """Risk of the largest loss, unless its pivot vanishes at a coordinate singularity."""
+        loss, singular = self.measured(result), SINGULARITY.measured(result)
+        if not (loss and singular and singular.risk and loss.hinge == singular.hinge):
+            yield from risks_of(loss)
+
+
+def accurate_sweep(model: CompiledScene) -> str:
+    """Cheapest accurate sweep at the start: "riccati", "refined" or "qr".
+
+    The model must have been compiled with "riccati".
+    """
+    if not _may_lose_digits(model):
+        return "riccati"
+    packed = model.packed_scene
+    q, u = start_values(packed.scene, packed.layout, packed.flexible)
+    loss = pivot_loss(model, RunStart(model, Settings(0.0), q, u).state)
+    return "riccati" if loss is None or loss.risk is None else loss.sweep
+
+
+def _may_lose_digits(model: CompiledScene) -> bool:
+    """Whether mass ratios are so large that digits may be lost."""
+    packed = model.packed_scene
+    if packed.qr or packed.system.has_loops or len(model.scene.bodies) > _MAX_BODIES:
+        return False
+    return _MAX_LOSS_PER_RATIO * _max_mass_ratio(model.scene) >= MAX_PIVOT_LOSS
+
+
+def _max_mass_ratio(scene: Scene) -> float:
+    """Largest ratio of two masses or of two moments of inertia."""
+    tables = [*scene.body, *(table for chain in scene.chain for table in chain.body)]
+    masses = [*(table.mass for table in tables), *(beam.mass for beam in scene.beam)]
+    return max(_max_ratio(masses), _max_ratio(x for table in tables for x in table.inertia[:3]))
+
+
+def _max_ratio(values: Iterable[float]) -> float:
+    positive = [value for value in values if value > 0]
+    return max(positive) / min(positive) if positive else 1.0
 
 
 def pivot_loss(model: CompiledScene, run: Trajectory) -> PivotLoss | None:
@@ -238,13 +211,31 @@ def _carried_motion(turn: Array, shift: Array) -> Array:
 # --- singular coordinates -------------------------------------------------------------------------
 
 
-def may_be_singular(model: CompiledScene) -> bool:
-    """Whether any hinge has a coordinate singularity."""
-    return any(
-        _singularity_kernel(model, group.first + k) is not None
-        for group in model.coordinate_layout.groups
-        for k in range(min(group.count, len(group.hinges)))
-    )
+class SingularityCheck(MeasuringCheck[SingularDistance | None]):
+    """Hinges whose coordinates are singular (gimbal lock)."""
+
+    def before(self, start: RunStart) -> Iterator[Risk]:
+        """Risk of the hinge nearest to a singularity, at the start and along drives."""
+        if any(_singular_hinges(start.model)):
+            yield from risks_of(singular_distance(start.model, start.drive_path), before=True)
+
+    def measure(self, result: Record) -> SingularDistance | None:
+        """Smallest distance over the samples of the run."""
+        return singular_distance(result.model, result.trajectory)
+
+    def after(self, result: Record) -> Iterator[Risk]:
+        """Risk of the hinge nearest to a singularity."""
+        yield from risks_of(self.measured(result))
+
+
+def _singular_hinges(model: CompiledScene) -> Iterator[tuple[range, Any]]:
+    """Numbers of the hinges that share numbers and type, and their kernel `singularity`."""
+    for group in model.coordinate_layout.groups:
+        period = len(group.hinges)
+        for first in range(group.first, group.first + min(group.count, period)):
+            kernel = _singularity_kernel(model, first)
+            if kernel is not None:
+                yield range(first, group.first + group.count, period), kernel
 
 
 def singular_distance(model: CompiledScene, run: Trajectory) -> SingularDistance | None:
@@ -253,15 +244,11 @@ def singular_distance(model: CompiledScene, run: Trajectory) -> SingularDistance
     A change of sign between two samples counts as zero: the coordinates failed in between.
     """
     distances: list[SingularDistance] = []
-    for group in model.coordinate_layout.groups:
-        for k in range(min(group.count, len(group.hinges))):
-            kernel = _singularity_kernel(model, group.first + k)
-            if kernel is None:
-                continue
-            for number in range(group.first + k, group.first + group.count, len(group.hinges)):
-                measures = _singularity_measures(model, run, number, kernel)
-                if len(measures):
-                    distances.append(_smallest_distance(model, run, number, measures))
+    for numbers, kernel in _singular_hinges(model):
+        for number in numbers:
+            measures = _singularity_measures(model, run, number, kernel)
+            if len(measures):
+                distances.append(_smallest_distance(model, run, number, measures))
     return min(distances, key=lambda candidate: candidate.measure, default=None)
 
 
@@ -304,3 +291,6 @@ def _singularity_measures(model: CompiledScene, run: Trajectory, number: int, ca
         if call(list(p), ffi.from_buffer("double[]", row), pointer) == 0:
             measures[k] = pointer[0]
     return measures[np.isfinite(measures)]
+
+
+PIVOT_LOSS, SINGULARITY = PivotLossCheck(), SingularityCheck()

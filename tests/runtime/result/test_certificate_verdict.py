@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import mstmm
+from mstmm.runtime.result.certificate import Verdict
 from mstmm.runtime.result.result import Result
-from mstmm.runtime.result.verdict import Verdict
 from tests.support.scenes.results import motor, pins, rod
 
 

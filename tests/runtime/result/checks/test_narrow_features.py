@@ -9,8 +9,8 @@ import pytest
 
 import mstmm
 from mstmm.runtime.integrate.settings import Settings
-from mstmm.runtime.result import narrow_features
-from mstmm.runtime.result.narrow_features import missed_feature_risks
+from mstmm.runtime.result.checks import narrow_features
+from mstmm.runtime.result.checks.narrow_features import missed_feature_risks
 from mstmm.runtime.result.result import Result
 from mstmm.runtime.run import run_execution
 from mstmm.runtime.run.trajectory import Trajectory

@@ -1,23 +1,36 @@
-"""Energy and momentum balances of a run.
+"""Energy and momentum balances of a run, and the drift that its steps explain.
 
 Energy minus work, and momentum without external loads, should stay constant. Their drift is not the
 error of the motion, but it reveals wrong steps and wrong laws.
+
+Control of local errors lets energy drift by up to nine times the tolerance, and errors of motions
+are four to sixty times the drift, relative to what moves; both counted on the runs of
+benchmarks/risk_checks.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mstmm.array_validation import Array
+from mstmm.risk import Risk
 from mstmm.scene import Hinge, Scene
 
-from ..engine.compiled_scene import total_mass, total_weight
-from .certificate_data import Drift
+from ...engine.compiled_scene import total_mass, total_weight
+from ...integrate.achieved_error import AchievedError
+from ...integrate.settings import Settings
+from ...integrate.steppers import get, names
+from ..certificate_data import Drift, StepControl
+from ..result_record import Record
+from .check import MeasuringCheck
 from .impacts import momentum_kept_by_impacts
-from .result_record import Record
+from .loops import CLOSURE, MISFIT_REMEDY
+
+#: Order assumed for methods without a tableau.
+_DEFAULT_ORDER = 2
 
 #: A hinge load counts as zero below this part of the largest one.
 _ZERO_LOAD_RATIO = 1e-9
@@ -30,6 +43,50 @@ _HEIGHT_ROUNDING = 1e-15
 
 #: Maximum number of bodies sampled to estimate the extent of a scene.
 _MAX_SAMPLED_BODIES = 30
+
+
+def step_control(settings: Settings, reached: AchievedError | None) -> StepControl:
+    """Step control of a run."""
+    has_tableau = settings.method in names()
+    order = get(settings.method).order if has_tableau else _DEFAULT_ORDER
+    target_error = None
+    if reached is not None:
+        target_error = reached.target if reached.unit in ("1", "rad") else 0.0
+    return StepControl(settings.step, settings.rtol, settings.atol, order, target_error)
+
+
+class BalanceCheck(MeasuringCheck[tuple[Drift, ...]]):
+    """Energy and momentum that are not conserved."""
+
+    def measure(self, result: Record) -> tuple[Drift, ...]:
+        """Drift of energy, then those of conserved momenta."""
+        return (energy_drift(result), *momentum_drifts(result))
+
+    def after(self, result: Record) -> Iterator[Risk]:
+        """Risks of balances that are unknown, or drift more than steps explain."""
+        drifts, closure = self.measured(result), CLOSURE.measured(result)
+        control = step_control(result.settings, result.achieved_error)
+        for drift in drifts:
+            if not drift.is_known:
+                yield Risk(
+                    drift.risk_name, drift.name,
+                    f"the drift of {drift.name} is unknown: overflow, or no sample can be "
+                    "evaluated",
+                    "use smaller steps or tolerances, or find the quantity that grows without "
+                    "bound",
+                )  # fmt: skip
+        has_misfit = closure is not None and closure.misfit > 0
+        for drift in drifts:
+            if drift.relative > control.bound:
+                yield Risk(
+                    drift.risk_name, drift.name,
+                    f"{drift.name} is not conserved: it drifts by {drift}",
+                    MISFIT_REMEDY if has_misfit else control.finer(drift.relative),
+                    drift.relative, control.bound,
+                )  # fmt: skip
+
+
+BALANCE = BalanceCheck()
 
 
 def _max_abs(values: Array) -> float:

@@ -11,12 +11,12 @@ import numpy as np
 from mstmm.array_validation import Array
 from mstmm.risk import Risk
 
-from ..flexible.beam.beam_data import beam_data
-from ..flexible.beam.boundary_conditions import BeamEnvironment, boundary_conditions
-from ..flexible.beam_resolution import beam_resolution
+from ...flexible.beam.beam_data import beam_data
+from ...flexible.beam.boundary_conditions import BeamEnvironment, boundary_conditions
+from ...flexible.beam_resolution import beam_resolution
 
 if TYPE_CHECKING:
-    from ..engine.compiled_scene import CompiledScene
+    from ...engine.compiled_scene import CompiledScene
 
 #: Accepted ratio of a frequency to the limit, and share of the strain energy of a mode from which
 #: on a body matters.

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import mstmm
-from mstmm.runtime.risk_checks.shape_range import shape_limits
+from mstmm.runtime.result.checks.shape_range import shape_limits
 
 WALL = {"name": "h", "type": "fixed", "inboard": "ground", "outboard": "b"}
 #: beta L of clamped-free, pinned-free and free-free bars.

@@ -17,10 +17,10 @@ from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure
 from mstmm.scene import Hinge
 
-from ..engine.fused_code import NoFusedCode
-from ..engine.state_evaluation.kinematics import Kinematics
-from ..run.scene_system import SceneSystem
-from .result_record import Record
+from ...engine.fused_code import NoFusedCode
+from ...engine.state_evaluation.kinematics import Kinematics
+from ...run.scene_system import SceneSystem
+from ..result_record import Record
 
 #: Relative size of motions, and of the terms of a rate, that count as zero.
 _ZERO_RATIO = 1e-9

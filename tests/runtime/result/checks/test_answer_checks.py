@@ -15,11 +15,7 @@ from mstmm.risk import AssessedResult, Risk
 from mstmm.runtime.linear import root_locus
 from mstmm.runtime.linear.linear_model import Linear
 from mstmm.runtime.model.model import Model
-from mstmm.runtime.risk_checks.state_risks import (
-    NOT_APPLICABLE,
-    find_state_risks,
-    merge_over_values,
-)
+from mstmm.runtime.result.checks.answer_checks import find_state_risks, merge_over_values
 
 ROOT = Path(mstmm.__file__).resolve().parents[1]
 
@@ -151,6 +147,20 @@ OF_ANSWERS = {
     "unrestrained", "unstable", "unsteady-state",
 }  # fmt: skip
 
+_STEPS = "an answer about a state takes no steps"
+_TIME = "an answer about a state covers no time"
+
+#: Risk of runs that does not apply to answers about a state -> reason.
+NOT_APPLICABLE = {
+    **dict.fromkeys(
+        ("step-stability", "step-accuracy", "stiff", "quaternion-length", "wanted-error"), _STEPS
+    ),
+    **dict.fromkeys(
+        ("narrow-load", "pole", "switches", "chatter", "energy-drift", "momentum-drift",
+         "one-way-loads", "one-way-blow", "one-way-release"), _TIME
+    ),
+}  # fmt: skip
+
 
 def risk_names(*folders: str) -> set[str]:
     """The kinds of risk that the source in some folders gives rows for."""
@@ -174,8 +184,9 @@ def test_every_check_of_runs_serves_answers_or_is_not_applicable() -> None:
     those of scenes and states, which reach answers by the run of no duration that examines them."""
     of_runs = risk_names("runtime/run", "runtime/discontinuities", "runtime/integrate")
     assert of_runs <= NOT_APPLICABLE.keys()
-    of_states = risk_names("mstmm/scene", "runtime/risk_checks")
-    assert (of_states - of_runs) & NOT_APPLICABLE.keys() == {"stiff"}  # of the steps of a run ahead
+    of_states = risk_names("mstmm/scene", "runtime/result/checks")
+    of_steps = {"stiff", "quaternion-length"}  # of the steps of a run ahead, or behind
+    assert (of_states - of_runs) & NOT_APPLICABLE.keys() == of_steps
     assert risk_names() | {"energy-drift", "momentum-drift"} >= OF_ANSWERS | NOT_APPLICABLE.keys()
     assert not OF_ANSWERS & NOT_APPLICABLE.keys()
     assert all(NOT_APPLICABLE.values())

@@ -9,13 +9,16 @@ import pytest
 import mstmm
 from mstmm.risk import Risk
 from mstmm.runtime.integrate.settings import Settings
-from mstmm.runtime.risk_checks.pre_run import check_before_run
+from mstmm.runtime.result.checks.check import RunStart
+from mstmm.runtime.result.checks.run_checks import check_before_run
 from tests.support.scenes.results import motor, rod
 
 
 def risks_before_run(scene: mstmm.Scene, t_end: float = 10.0, **settings: Any) -> list[Risk]:
     model = mstmm.compile(scene, engine="looped", sweep="riccati")
-    found = check_before_run(model, Settings(t_end, **settings), *model.initial_state()).risks
+    found = check_before_run(
+        RunStart(model, Settings(t_end, **settings), *model.initial_state())
+    ).risks
     assert all(risk.seen_before_run for risk in found)
     return list(found)
 
@@ -48,7 +51,7 @@ def test_masses_that_are_alike_are_not_even_looked_at(monkeypatch: pytest.Monkey
     def refuse_call(*_: Any) -> None:
         raise AssertionError("pivots were computed")
 
-    monkeypatch.setattr("mstmm.runtime.risk_checks.mass_ratio.pivot_loss", refuse_call)
+    monkeypatch.setattr("mstmm.runtime.result.checks.conditioning.pivot_loss", refuse_call)
     assert not risks_before_run(chain([1.0, 2.0, 5.0]))
 
 

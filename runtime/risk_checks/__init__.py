@@ -1,1 +1,0 @@
-"""Checks before a run, checks of answers about a state, and the reaction to risks."""
