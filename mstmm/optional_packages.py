@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import sys
 from importlib.util import find_spec
-from io import BytesIO
-from typing import Any
 
 from .errors import EnvironmentFailure
 
@@ -39,28 +37,3 @@ def missing_package_error(name: str, what: str, error: ImportError) -> Environme
         f"{what} needs the package {error.name or 'of an extra'}, which is not installed; "
         f"install it with: pip install 'mstmm[{name}]'"
     )
-
-
-def figure_class(what: str = "a picture") -> Any:
-    """Class `matplotlib.figure.Figure`, registered for display in notebooks.
-
-    The notebook needs no magic command for that.  EnvironmentFailure without the extra `plot`.
-    """
-    try:
-        from matplotlib import figure
-    except ImportError as error:
-        raise missing_package_error("plot", what, error) from None
-    Figure = figure.Figure
-    ipython = sys.modules.get("IPython")
-    shell = None if ipython is None else ipython.get_ipython()
-    if shell is not None and hasattr(shell, "kernel"):
-        formatter = shell.display_formatter.formatters["image/png"]
-        if Figure not in formatter.type_printers:
-            formatter.for_type(Figure, _png)
-    return Figure
-
-
-def _png(figure: Any) -> bytes:
-    buffer = BytesIO()
-    figure.savefig(buffer, format="png", bbox_inches="tight")
-    return buffer.getvalue()

@@ -14,6 +14,7 @@ from ..runtime.platform_support.safe_files import write_text
 from . import cases as case_registry
 from .case_definition import CaseDefinition, CaseResult
 from .frontier import MeasuredMethod, find_end, find_frontier
+from .page import draw_case, markdown_page
 
 #: Values of the coarse grid, and relative width of the last bracket.
 GRID_POINTS, BRACKET_TOLERANCE = 13, 0.01
@@ -31,9 +32,7 @@ class MeasuredCase(CaseResult):
         With `path` the figure is also written to that file.  Raises SceneError for a path that is
         no .png, .svg or .pdf, EnvironmentFailure without the extra `plot`.
         """
-        from .picture import draw_case
-
-        return draw_case(self, None if path is None else Path(path))
+        return draw_case(self, path)
 
 
 def measure_case(case: CaseDefinition, points: int, tolerance: float) -> MeasuredCase:
@@ -109,8 +108,6 @@ class Atlas:
         Returns the paths.  The folder is created with its parents; raises EnvironmentFailure if
         that fails.
         """
-        from .page import markdown_page
-
         folder_path = Path(folder)
         try:
             folder_path.mkdir(parents=True, exist_ok=True)

@@ -113,7 +113,7 @@ class FrequencyResponse(AssessedResult):
 
         Raises EnvironmentFailure without the extra `plot`.
         """
-        from .plots.bode_and_locus import bode
+        from .plots.linear_plots import bode
 
         units = [_ratio(y, u) for y in self.output_units for u in self.input_units]
         values, labels = self._curves()
@@ -124,7 +124,7 @@ class FrequencyResponse(AssessedResult):
 
     def plot_nyquist(self, path: str | Path | None = None) -> Any:
         """Nyquist plot as a `matplotlib.figure.Figure`; see `plot`."""
-        from .plots.bode_and_locus import nyquist
+        from .plots.linear_plots import nyquist
 
         return nyquist(*self._curves(), path)
 

@@ -181,7 +181,7 @@ class Linear(PublicMembers, StateSpace):
 
         Raises SceneError without coordinates, EnvironmentFailure without the extra `plot`.
         """
-        from .plots.matrices import matrices
+        from .plots.linear_plots import matrices
 
         return matrices(self, path)
 

@@ -81,7 +81,7 @@ class RootLocus(AssessedResult):
 
         Raises EnvironmentFailure without the extra `plot`.
         """
-        from .plots.bode_and_locus import locus
+        from .plots.linear_plots import locus
 
         lines = np.atleast_1d(finite_array("orders", orders)).tolist()
         return locus(

@@ -47,7 +47,7 @@ class Waterfall(AssessedResult):
 
         Raises EnvironmentFailure without the extra `plot`.
         """
-        from .plots.bode_and_locus import waterfall
+        from .plots.linear_plots import waterfall
 
         frequency, up = self.omega / (2 * np.pi), np.argsort(self.parameter_values)
         return waterfall(

@@ -21,9 +21,8 @@ from ..run.batch.batch_run import BatchData
 from ..run.trajectory import Trajectory
 from .export import xarray_dataset
 from .export.result_files import save_dataset
-from .plotting.default_quantities import default_candidates
+from .plotting.default_quantities import Candidate, default_candidates
 from .plotting.panels import Panel, PlotSelection, Trace, build_panels
-from .plotting.plot_sources import Candidate
 from .quantity_names import Quantity, column_labels
 from .result_record import Record
 

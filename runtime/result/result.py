@@ -15,7 +15,7 @@ from .certificate import Certificate
 from .result_record import Record
 
 if TYPE_CHECKING:
-    from .plotting.plot_sources import Candidate, PlotSource
+    from .plotting.default_quantities import Candidate, PlotSource
     from .scene3d.view import SceneView
 
 

@@ -15,7 +15,7 @@ import pytest
 import mstmm
 from mstmm.derive.catalogue.registry import builtin_elements
 from mstmm.errors import SceneError
-from mstmm.optional_packages import figure_class
+from mstmm.runtime.figures import figure_class
 from tests.support.paths import ROOT
 from tests.support.scenes import view as scenes
 

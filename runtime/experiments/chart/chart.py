@@ -44,7 +44,7 @@ class Chart(ChartRecord):
 
         With `path` (.png, .svg, .pdf) also write the file.
         """
-        return plot(self, None if path is None else Path(path))
+        return plot(self, path)
 
     def to_html(self) -> str:
         """Self-contained HTML page: the plot, with details of a point on hover, and all tables."""

@@ -9,18 +9,10 @@ from textwrap import wrap
 from typing import Any
 
 from mstmm.display import escape_control_characters
-from mstmm.errors import SceneError
-from mstmm.optional_packages import figure_class
 
-from ...platform_support.safe_files import replace_atomically
+from ...figures import figure_class, figure_style, write_figure
 from .chart_record import ChartRecord
 from .plot_elements import Drawing, Entry, build_drawing, decades, time_text
-
-_STYLE: dict[str, Any] = {
-    "font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True,
-    "grid.color": "#e6e6e6", "grid.linewidth": 0.6, "axes.axisbelow": True,
-    "axes.edgecolor": "#555555", "savefig.dpi": 150,
-}  # fmt: skip
 
 #: Characters in a line of the subtitle.
 _SUBTITLE_COLUMNS = 150
@@ -34,37 +26,24 @@ def has_matplotlib() -> bool:
     return find_spec("matplotlib") is not None
 
 
-def plot(chart: ChartRecord, path: Path | None) -> Any:
+@figure_style(9)
+def plot(chart: ChartRecord, path: str | Path | None) -> Any:
     """Plot a chart as `matplotlib.figure.Figure`, and write it to `path` if given.
 
     Raises EnvironmentFailure without matplotlib, SceneError for an unknown file extension.
     """
-    Figure = figure_class()
-    import matplotlib as mpl
-
     drawing = build_drawing(chart)
     height = max(_HEIGHT, _ROW * len(drawing.legend) + 0.9)
-    style: Any = _STYLE
-    with mpl.rc_context(style):
-        figure = Figure(figsize=(_WIDTH, height))
-        axes = figure.add_axes((0.085, 0.62 / height, 0.675, 1 - 1.36 / height))
-        _draw_axes(axes, drawing)
-        _draw_legend(figure, drawing.legend, height)
-        figure.text(
-            0.085,
-            1 - 0.1 / height,
-            escape_control_characters(drawing.title),
-            fontsize=12,
-            va="top",
-            weight="bold",
-            parse_math=False,
-        )
-        for i, line in enumerate(wrap(escape_control_characters(drawing.below), _SUBTITLE_COLUMNS)):
-            figure.text(0.085, 1 - (0.34 + 0.15 * i) / height, line, fontsize=8, va="top",
-                        color="#555555", parse_math=False)  # fmt: skip
-        if path is not None:
-            _write_figure(figure, path)
-    return figure
+    figure = figure_class()(figsize=(_WIDTH, height))
+    _draw_axes(figure.add_axes((0.085, 0.62 / height, 0.675, 1 - 1.36 / height)), drawing)
+    _draw_legend(figure, drawing.legend, height)
+    title = escape_control_characters(drawing.title)
+    figure.text(0.085, 1 - 0.1 / height, title, fontsize=12, va="top", weight="bold",
+                parse_math=False)  # fmt: skip
+    for i, line in enumerate(wrap(escape_control_characters(drawing.below), _SUBTITLE_COLUMNS)):
+        figure.text(0.085, 1 - (0.34 + 0.15 * i) / height, line, fontsize=8, va="top",
+                    color="#555555", parse_math=False)  # fmt: skip
+    return write_figure(figure, path, "plot file")
 
 
 def _draw_axes(axes: Any, drawing: Drawing) -> None:
@@ -93,15 +72,8 @@ def _draw_axes(axes: Any, drawing: Drawing) -> None:
             zorder=5 if line.is_emphasised else 2, clip_on=True,
         )  # fmt: skip
     if drawing.pareto_front:
-        axes.plot(
-            *zip(*drawing.pareto_front, strict=True),
-            "o",
-            ms=9,
-            mfc="none",
-            mec="#111111",
-            mew=0.9,
-            zorder=6,
-        )
+        axes.plot(*zip(*drawing.pareto_front, strict=True), "o", ms=9, mfc="none", mec="#111111",
+                  mew=0.9, zorder=6)  # fmt: skip
     for label in drawing.labels:
         axes.annotate(
             label.text, label.position, (label.at[0], -label.at[1]), textcoords="offset points",
@@ -144,11 +116,3 @@ def _draw_legend(figure: Any, entries: Sequence[Entry], height: float) -> None:
         ))  # fmt: skip
         figure.text(0.826, y, escape_control_characters(entry.text), fontsize=8, va="center",
                     color="#111111" if entry.strong else "#666666", parse_math=False)  # fmt: skip
-
-
-def _write_figure(figure: Any, path: Path) -> None:
-    kind = path.suffix.lower().lstrip(".")
-    if kind not in figure.canvas.get_supported_filetypes():
-        raise SceneError(f'plot file "{path}": expected a name that ends in .png, .svg or .pdf')
-    with replace_atomically(path) as temporary:
-        figure.savefig(temporary, format=kind)

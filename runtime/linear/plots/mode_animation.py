@@ -21,8 +21,7 @@ from ...result.scene3d.scene_graph import SceneGraph, Solid
 from ...result.scene3d.solid_meshes import Surface, join_surfaces
 from ...result.scene3d.view import SceneView
 from ...run.trajectory import Trajectory
-from .mode_shapes import Complex, eigenvalue_text
-from .wireframe import amplitudes
+from .mode_shapes import Complex, amplitudes, eigenvalue_text
 
 if TYPE_CHECKING:
     from ..linear_equations import LinearEquations

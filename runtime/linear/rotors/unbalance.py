@@ -73,7 +73,7 @@ class UnbalanceResponse(AssessedResult):
 
         Raises EnvironmentFailure without the extra `plot`.
         """
-        from ..plots.bode_and_locus import unbalance
+        from ..plots.linear_plots import unbalance
 
         return unbalance(self.spin, self.amplitude, self.end_names, path)
 

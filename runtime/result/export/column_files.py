@@ -17,8 +17,7 @@ from mstmm.errors import SceneError
 from mstmm.scene.validators.validation_messages import did_you_mean
 
 from ...engine.quantity_registry import BODY_QUANTITIES, HINGE_QUANTITIES, WXYZ, XYZ
-from ..plotting.default_quantities import rate_candidates
-from ..plotting.plot_sources import Candidate
+from ..plotting.default_quantities import Candidate, rate_candidates
 from ..quantity_names import Quantity
 from ..sources.euler_angles import EULER_KIND
 from .csv_and_mat import TABLES, write_table

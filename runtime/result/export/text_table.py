@@ -12,7 +12,7 @@ from mstmm.array_validation import integer
 from ..plotting.default_quantities import choose_panels
 
 if TYPE_CHECKING:
-    from ..plotting.plot_sources import PlotSource
+    from ..plotting.default_quantities import PlotSource
     from ..quantity_names import Quantity
 
 #: Default number of columns of a table.

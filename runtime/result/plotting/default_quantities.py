@@ -5,17 +5,48 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
-from ..quantity_names import column_labels
+from mstmm.array_validation import Array
+
+from ..quantity_names import Quantity, column_labels
 from ..sources.euler_angles import EULER_KIND
-from .plot_sources import Candidate, PlotSource, QuantitySource
 
 if TYPE_CHECKING:
     from ...packing.coordinate_layout import HingeSlots
     from ..result_record import Record
+
+
+class Candidate(NamedTuple):
+    """Candidate for a plot: name, unit, and range of its values."""
+
+    name: str
+    unit: str
+    moved: float
+
+
+class QuantitySource(Protocol):
+    """Quantities by name."""
+
+    def quantity(self, name: str) -> Quantity:
+        """Quantity of this name; SceneError with the nearest name if there is none."""
+        ...
+
+
+class PlotSource(QuantitySource, Protocol):
+    """Quantities by name over the times `t` (n,) in s."""
+
+    @property
+    def t(self) -> Array: ...
+
+    def default_quantities(self) -> list[Candidate]:
+        """Candidates for default quantities, the most informative kinds first."""
+        ...
+
+
+# --- choice of the quantities ---------------------------------------------------------------------
 
 #: Largest numbers of curves in a panel and of panels in a plot.
 MAX_CURVES, MAX_PANELS = 6, 4

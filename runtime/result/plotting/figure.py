@@ -15,40 +15,18 @@ from mstmm.argument_validation import abbreviate, optional_text, require_path, r
 from mstmm.array_validation import mapping_by_name
 from mstmm.display import escape_control_characters
 from mstmm.errors import SceneError
-from mstmm.optional_packages import figure_class
 
-from ...platform_support.safe_files import replace_atomically
+from ...figures import curve_marker, curve_style, figure_style, new_figure, write_figure
 from ..flexible.shape_panels import ShapePanel, shape_panel
 from ..flexible.shape_panels import panel_names as names_of_pictures
+from .default_quantities import PlotSource
 from .panels import Panel, PlotSelection, Trace, build_panels, constant_axis_limits
-from .plot_sources import PlotSource
-
-#: Colours that are distinguishable in grey and for colour-blind readers (Okabe and Ito, 2008).
-_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000", "#F0E442")
-
-_STYLE: dict[str, Any] = {
-    "font.size": 10,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.color": "#e3e3e3",
-    "grid.linewidth": 0.7,
-    "axes.edgecolor": "#555555",
-    "axes.axisbelow": True,
-    "axes.formatter.use_mathtext": True,
-    "axes.formatter.useoffset": False,
-    "axes.formatter.limits": (-4, 5),
-    "lines.linewidth": 1.6,
-    "legend.frameon": False,
-    "savefig.dpi": 150,
-}
 
 #: Inches: height of a panel of curves, and extra height of one with equal scales on both axes.
 _PANEL_HEIGHT, _EXTRA_HEIGHT = 2.3, 0.9
 
-#: Line styles and markers of curves of equal colour; colour of runs in a combined legend.
-_LINE_STYLES = ("-", (0, (5, 1.6)), (0, (1.2, 1.4)), (0, (6, 1.5, 1.2, 1.5)))
-_MARKERS, _RUN_COLOUR = ("o", "s", "^", "D"), "#555555"
+#: Colour of runs in a combined legend.
+_RUN_COLOUR = "#555555"
 
 #: Amplitudes below this part of the largest are rounding and not shown.
 _MIN_AMPLITUDE_RATIO = 1e-6
@@ -64,14 +42,7 @@ class PlottedFigure:
 
     def write(self, path: Path) -> None:
         """Write the figure to a file; SceneError for a suffix other than .png, .svg or .pdf."""
-        import matplotlib as mpl
-
-        kind = path.suffix.lower().lstrip(".")
-        if kind not in self.figure.canvas.get_supported_filetypes():
-            raise SceneError(f'picture "{path}": expected a name that ends in .png, .svg or .pdf')
-        style: Any = _STYLE
-        with mpl.rc_context(style), replace_atomically(path) as temporary:
-            self.figure.savefig(temporary, format=kind)
+        write_figure(self.figure, path)
 
 
 def draw_runs(
@@ -108,13 +79,11 @@ def compose_panels(
     return _compose_figure([], (), panels, title, ax)
 
 
+@figure_style()
 def _compose_figure(
     pictures: list[ShapePanel], shapes: tuple[str, ...], panels: Sequence[Panel], title: str | None,
     ax: Any,
 ) -> PlottedFigure:  # fmt: skip
-    Figure = figure_class()
-    import matplotlib as mpl
-
     pictures += [
         ShapePanel(
             partial(_draw_panel, panel),
@@ -125,16 +94,13 @@ def _compose_figure(
     ]
     if not pictures:
         raise SceneError("nothing to plot: give the name of a quantity, such as energy")
-    style: Any = _STYLE
-    with mpl.rc_context(style):
-        if ax is not None:
-            figure = _draw_into(ax, pictures)
-        else:
-            height = 1.0 + sum(panel.height for panel in pictures)
-            figure = Figure(figsize=(7.5, height), layout="constrained")
-            _lay_out(figure, pictures)
-        if title:
-            figure.suptitle(escape_control_characters(title), parse_math=False)
+    if ax is not None:
+        figure = _draw_into(ax, pictures)
+    else:
+        figure = new_figure(7.5, 1.0 + sum(panel.height for panel in pictures))
+        _lay_out(figure, pictures)
+    if title:
+        figure.suptitle(escape_control_characters(title), parse_math=False)
     return PlottedFigure(figure, shapes, tuple(panels))
 
 
@@ -289,12 +255,8 @@ def _draw_curve(axis: Any, trace: Trace) -> None:
 
 def _line_style(trace: Trace) -> dict[str, Any]:
     """Colour and line style of a curve, or the marker of a single point."""
-    style_number = trace.style + trace.colour // len(_COLOURS)
-    return {
-        "color": _COLOURS[trace.colour % len(_COLOURS)],
-        "linestyle": _LINE_STYLES[style_number % len(_LINE_STYLES)],
-        "marker": _MARKERS[style_number % len(_MARKERS)] if len(trace.x) == 1 else None,
-    }
+    marker = curve_marker(trace.colour, trace.style) if len(trace.x) == 1 else None
+    return {**curve_style(trace.colour, trace.style), "marker": marker}
 
 
 def _set_amplitude_axis(axis: Any, panel: Panel) -> None:

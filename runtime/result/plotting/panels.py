@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -13,10 +14,104 @@ from mstmm.errors import SceneError
 
 from ...engine.quantity_registry import rate_unit
 from ..quantity_names import Quantity, column_labels
-from .curve_interpolation import curve
-from .default_quantities import DefaultPanel, choose_panels
-from .plot_sources import PlotSource
-from .spectra import spectrum
+from .default_quantities import DefaultPanel, PlotSource, choose_panels
+
+# --- curves through the samples -------------------------------------------------------------------
+
+#: Runs with at least this many samples are drawn unchanged; others are refined to this many.
+MIN_DRAWN_POINTS = 600
+
+
+def curve(t: Array, quantity: Quantity) -> tuple[Array, Array]:
+    """Times (m,) and values (m, k) to draw; nan between two samples at one time (an event).
+
+    Between samples: the cubic through values and rates where the rate is known, else Akima's
+    modified interpolant, which does not overshoot at corners (H. Akima, J. ACM 17 (1970) 589-602).
+    """
+    values = quantity.values.reshape(len(t), -1)
+    rates = None if quantity.rates is None else quantity.rates().reshape(len(t), -1)
+    times, value_pieces = list[Array](), list[Array]()
+    for piece in np.split(np.arange(len(t)), np.flatnonzero(np.diff(t) == 0) + 1):
+        x, y = t[piece], values[piece]
+        if len(t) < MIN_DRAWN_POINTS and len(piece) > 1 and np.isfinite(y).all():
+            x = refine_times(x, MIN_DRAWN_POINTS / max(t[-1] - t[0], 1e-300))
+            y = interpolate(t[piece], y, None if rates is None else rates[piece], x)
+        times += [x, np.array([np.nan])]
+        value_pieces += [y, np.full((1, values.shape[1]), np.nan)]
+    return np.concatenate(times[:-1]), np.concatenate(value_pieces[:-1])
+
+
+def refine_times(t: Array, density: float) -> Array:
+    """Times with evenly spaced ones added between them, `density` per second or more."""
+    parts = [
+        np.linspace(a, b, max(2, int((b - a) * density) + 1), endpoint=False)
+        for a, b in pairwise(t)
+    ]
+    return np.concatenate([*parts, t[-1:]])
+
+
+def interpolate(t: Array, values: Array, rates: Array | None, x: Array) -> Array:
+    """Values (m, k) at the times x between those at t (n,): see `curve`."""
+    from scipy.interpolate import Akima1DInterpolator, CubicHermiteSpline
+
+    if rates is not None and np.isfinite(rates).all():
+        return np.asarray(CubicHermiteSpline(t, values, rates)(x))
+    if len(t) < 3:
+        return np.stack([np.interp(x, t, column) for column in values.T], axis=1)
+    return np.asarray(Akima1DInterpolator(t, values, method="makima")(x))
+
+
+# --- spectra --------------------------------------------------------------------------------------
+
+#: Least number of samples for a spectrum, and largest number used.
+_MIN_SAMPLES, _MAX_SAMPLES = 16, 2**16
+
+#: Factor of refinement relative to frequencies spaced by one over the run, to locate peaks.
+_FREQUENCY_REFINEMENT = 4
+
+
+def spectrum(t: Array, quantity: Quantity) -> tuple[Array, Array]:
+    """Frequencies (m,) in Hz and amplitudes (m, k) in the quantity's unit.
+
+    A sine of amplitude a that lasts for many periods appears as a peak of height a: the mean is
+    subtracted, and Hann's window is applied and normalised by its own mean (SciPy's periodogram,
+    scaling "spectrum"). Samples that are not evenly spaced are interpolated on the curve through
+    them at the same number of even times; frequencies end at two samples per period.
+
+    Raises SceneError for too few samples and for values that are not finite.
+    """
+    from scipy.signal import periodogram
+
+    t, unique_indices = np.unique(t, return_index=True)
+    values = quantity.values.reshape(len(quantity.values), -1)[unique_indices]
+    if len(t) < _MIN_SAMPLES:
+        raise SceneError(
+            f'"{quantity.name}": a spectrum needs {_MIN_SAMPLES} samples or more, there are '
+            f"{len(t)}; give more output times"
+        )
+    if not np.isfinite(values).all():
+        raise SceneError(f'"{quantity.name}": some values are not finite, so it has no spectrum')
+    even_times = np.linspace(t[0], t[-1], min(len(t), _MAX_SAMPLES))
+    if not np.allclose(t, even_times, rtol=0, atol=1e-6 * (even_times[1] - even_times[0])):
+        rates = (
+            None if quantity.rates is None else quantity.rates().reshape(len(quantity.values), -1)
+        )
+        values = interpolate(
+            t, values, None if rates is None else rates[unique_indices], even_times
+        )
+    frequencies, powers = periodogram(
+        values,
+        1 / (even_times[1] - even_times[0]),
+        "hann",
+        _FREQUENCY_REFINEMENT * len(even_times),
+        "constant",
+        scaling="spectrum",
+        axis=0,
+    )
+    return frequencies, np.sqrt(2 * powers)
+
+
+# --- panels ---------------------------------------------------------------------------------------
 
 #: Kinds of plots: over time or another quantity, rate over quantity, or over frequency.
 PLOT_KINDS = ("time", "phase", "spectrum")

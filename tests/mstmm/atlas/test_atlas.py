@@ -95,7 +95,7 @@ def test_a_folder_is_made_with_its_parents(atlas: mstmm.Atlas, tmp_path: Path) -
 
 def test_a_picture_of_another_kind_is_refused(atlas: mstmm.Atlas, tmp_path: Path) -> None:
     with pytest.raises(SceneError, match=r"ends in \.png, \.svg or \.pdf"):
-        atlas.cases[0].plot(tmp_path / "picture.gif")
+        atlas.cases[0].plot(tmp_path / "picture.txt")
 
 
 @pytest.mark.parametrize(

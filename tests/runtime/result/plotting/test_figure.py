@@ -11,9 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.image import imread
 
 import mstmm
-from mstmm.runtime.result.plotting.curve_interpolation import curve
 from mstmm.runtime.result.plotting.default_quantities import choose_panels
-from mstmm.runtime.result.plotting.spectra import spectrum
+from mstmm.runtime.result.plotting.panels import curve, spectrum
 from mstmm.runtime.result.quantity_names import Quantity
 from mstmm.runtime.result.result import Result
 from tests.support.models import model_of

@@ -11,7 +11,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.image import imread
 
 import mstmm
-from mstmm.runtime.result.flexible.plot_shapes import (
+from mstmm.runtime.result.flexible.shape_panels import (
     Strip,
     principal_plane,
     shape_samples,
