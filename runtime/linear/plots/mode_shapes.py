@@ -21,6 +21,7 @@ from mstmm.scene import split_reference
 from ...engine.looped_engine import Probe
 from ...figures import figure_style, new_figure, write_figure
 from ...result.flexible import motion as observe
+from ...result.scene3d.geometry import still_motion
 from .linear_plots import require_columns
 
 if TYPE_CHECKING:
@@ -194,11 +195,8 @@ class _SceneObservation:
         """Deflected axis (n, m, 3) of a beam."""
         pose, body = self.motions[name], self.model.flexible_bodies[name]
         eta = self.q[:, self.model.coordinate_layout.modal[name].q_slice]
-        none, still = np.zeros_like(eta), np.zeros((len(eta), 3))
-        motion = observe.Motion(
-            body, np.zeros(len(eta)), eta, none, none, pose[:, 0:3],
-            pose[:, 15:24].reshape(-1, 3, 3), still, still, still, still,
-        )  # fmt: skip
+        frame = pose[:, 0:3], pose[:, 15:24].reshape(-1, 3, 3)
+        motion = still_motion(body, np.zeros(len(eta)), eta, *frame)
         return observe.deflected_axis(motion, np.linspace(0.0, motion.shapes.length, _FINE))
 
     def springs(self) -> Iterator[Array]:

@@ -17,7 +17,7 @@ from mstmm.errors import EnvironmentFailure
 from mstmm.optional_packages import missing_package_error
 
 from ..observations import quaternions
-from .camera import FIELD_OF_VIEW, choose_camera
+from .projection import FIELD_OF_VIEW, choose_camera
 from .scene_graph import DeformingSurface, Line, Poses, SceneGraph, Solid
 from .solid_meshes import axes_along
 

@@ -14,10 +14,10 @@ from mstmm.scene import Load, split_reference
 from ..flexible import motion as observed
 from ..sources.applied_loads import AppliedLoads as Values
 from ..sources.loads import inertial_components
-from . import arrows, flexible_geometry
 from .frame_times import FrameTimes
+from .geometry import motion_at
 from .scene_graph import DeformingSurface, ObjectLabel, Poses, SceneGraph, Solid
-from .solid_meshes import Colour, Faces, Surface
+from .solid_meshes import Colour, Faces, Surface, circular_arrows, straight_arrows
 
 if TYPE_CHECKING:
     from ..result_record import Record
@@ -80,9 +80,7 @@ class LoadArrows:
         return _LoadHistory(load, wrench[:, :3], wrench[:, 3:], positions, pose)
 
     def _points_along(self, load: Load, pose: Poses) -> list[Array]:
-        motion = flexible_geometry.motion_at(
-            self.run, split_reference(load.on)[0], self.frame_times, pose
-        )
+        motion = motion_at(self.run, split_reference(load.on)[0], self.frame_times, pose)
         first, last = load.span or (0.0, float(motion.shapes.length))
         return list(
             np.moveaxis(
@@ -102,14 +100,14 @@ class LoadArrows:
                 scale = 1.0 if len(history.positions) == 1 else _LINE_LOAD_SCALE
                 vector = scale * _FORCE_LENGTH * self.size / max_force * history.force
                 arrow_meshes = [
-                    arrows.straight_arrows(position, vector, shaft_radius)
+                    straight_arrows(position, vector, shaft_radius)
                     for position in history.positions
                 ]
                 yield _joined_arrows(f"forces/{history.load.name}", arrow_meshes)
             if _max_norm(history.moment) > 0:
                 vector = _MOMENT_RADIUS * self.size / max_moment * history.moment
                 arrow_meshes = [
-                    arrows.circular_arrows(position, vector, shaft_radius)
+                    circular_arrows(position, vector, shaft_radius)
                     for position in history.positions
                 ]
                 yield _joined_arrows(f"moments/{history.load.name}", arrow_meshes)
@@ -165,7 +163,7 @@ def gravity_arrow(stage: SceneGraph, strength: float) -> tuple[Solid, ObjectLabe
         + (cloud_distance - (position - low) @ direction - _GRAVITY_DISTANCE * size) * direction
         + _GRAVITY_LENGTH / 2 * size * up
     )
-    vertices, faces = arrows.straight_arrows(
+    vertices, faces = straight_arrows(
         position[None], -_GRAVITY_LENGTH * size * up[None], _GRAVITY_RADIUS * size
     )
     arrow = Solid("gravity", "arrow", Surface(vertices[0], faces), _GRAVITY_COLOUR)

@@ -14,7 +14,7 @@ from mstmm.numerics.rotations import IDENTITY
 from mstmm.scene import Body, Hinge, Spring, split_reference
 from mstmm.scene.validators.scalars_and_vectors import GROUND
 
-from . import body_geometry, flexible_geometry, hinge_glyphs, user_geometry
+from . import geometry
 from .frame_times import FrameTimes
 from .load_arrows import LoadArrows, gravity_arrow
 from .scene_graph import DeformingSurface, Line, ObjectLabel, Poses, SceneGraph, Solid
@@ -72,7 +72,7 @@ class _SceneBuilder:
         run._observations.fetch(self.names)
         self.poses = {f"bodies/{name}": self.frame_times.poses(run, name) for name in self.names}
         self.size = self._size()
-        self.radius = body_geometry.bar_radius(self.size, self.size)
+        self.radius = geometry.bar_radius(self.size, self.size)
         self.load_arrows = LoadArrows(run, self.frame_times, self.size)
         self.notes = () if drawn else (f"more than {_MAX_HINGES} hinges: they are not drawn",)
 
@@ -137,7 +137,7 @@ class _SceneBuilder:
         for i, (name, body) in enumerate(zip(self.names, self.skeleton.bodies, strict=True)):
             if name not in names_with_geometry:
                 colour = _BODY_COLOURS[i % len(_BODY_COLOURS)]
-                yield from body_geometry.rigid_body_solids(
+                yield from geometry.rigid_body_solids(
                     name, body, name in hinged_references, self.size, colour
                 )
 
@@ -146,8 +146,8 @@ class _SceneBuilder:
         saved_files = self.run.meshes
         for shape in self.scene.shape:
             if shape.is_on_ground:
-                yield user_geometry.shape_solid(
-                    shape, (0.0, 0.0, 0.0), IDENTITY, hinge_glyphs.GROUND_COLOUR, saved_files
+                yield geometry.shape_solid(
+                    shape, (0.0, 0.0, 0.0), IDENTITY, geometry.GROUND_COLOUR, saved_files
                 )
                 continue
             number = self.skeleton.bodies.find(shape.owner)
@@ -155,36 +155,32 @@ class _SceneBuilder:
             body, end = self.skeleton.bodies[number], split_reference(shape.on)[1]
             position, axes = body.end_position(end), body.end_rotation(end)
             colour = _BODY_COLOURS[number % len(_BODY_COLOURS)]
-            yield user_geometry.shape_solid(shape, position, axes, colour, saved_files)
+            yield geometry.shape_solid(shape, position, axes, colour, saved_files)
 
     def _deforming_surfaces(self) -> Iterator[DeformingSurface]:
         shaped = {shape.owner for shape in self.scene.shape}
         for name, body in self.run.model.flexible_bodies.items():
             pose, colour = self.poses[f"bodies/{name}"], self._colour(name)
             if body.shapes is not None:
-                yield flexible_geometry.beam_tube(
-                    self.run, name, self.frame_times, pose, self.size, colour
-                )
+                yield geometry.beam_tube(self.run, name, self.frame_times, pose, self.size, colour)
             elif body.skin is not None and name not in shaped:
                 r = 0.3 * self.radius
-                yield flexible_geometry.elastic_surface(
-                    self.run, name, self.frame_times, pose, r, colour
-                )
+                yield geometry.elastic_surface(self.run, name, self.frame_times, pose, r, colour)
 
     def _joints(self) -> Iterator[Solid]:
         for hinge in self.hinges:
-            surface = hinge_glyphs.hinge_glyph(hinge, _GLYPH_RADIUS_RATIO * self._girth(hinge))
+            surface = geometry.hinge_glyph(hinge, _GLYPH_RADIUS_RATIO * self._girth(hinge))
             if surface is not None:
                 owner = f"hinges/{hinge.name}"
                 self.poses[owner] = self._glyph_poses(hinge)
-                yield Solid(owner, "glyph", surface, hinge_glyphs.HINGE_COLOUR)
+                yield Solid(owner, "glyph", surface, geometry.HINGE_COLOUR)
         for force in self.scene.bushing:
             owner = f"bushings/{force.name}"
             reference = force.from_ if split_reference(force.to)[0] == GROUND else force.to
             self.poses[owner] = self.frame_times.poses(self.run, reference)
             r = _GLYPH_RADIUS_RATIO * self.radius
             yield Solid(
-                owner, "glyph", ellipsoid_surface((r, r, 0.6 * r), 10), hinge_glyphs.SPRING_COLOUR
+                owner, "glyph", ellipsoid_surface((r, r, 0.6 * r), 10), geometry.SPRING_COLOUR
             )
 
     def _glyph_poses(self, hinge: Hinge) -> Poses:
@@ -211,13 +207,13 @@ class _SceneBuilder:
         for name in (hinge.inboard_body, hinge.outboard_body):
             number = self.skeleton.bodies.find(name)
             if number is not None:
-                radii.append(body_geometry.body_bar_radius(self.skeleton.bodies[number], self.size))
+                radii.append(geometry.body_bar_radius(self.skeleton.bodies[number], self.size))
         return min(radii)
 
     def _feet(self) -> Iterator[Solid]:
         radii_by_position = {hinge.position: self._girth(hinge) for hinge in self._ground_hinges()}
         for number, (at, girth) in enumerate(radii_by_position.items(), 1):
-            foot = hinge_glyphs.ground_block(np.array(at), _FOOT_RADIUS_RATIO * girth)
+            foot = geometry.ground_block(np.array(at), _FOOT_RADIUS_RATIO * girth)
             yield Solid(foot.owner, f"{number}", foot.surface, foot.colour)
 
     # --- lines ------------------------------------------------------------------------------------
@@ -228,8 +224,8 @@ class _SceneBuilder:
                 self._spring_end_path(spring, spring.from_),
                 self._spring_end_path(spring, spring.to),
             )
-            points = hinge_glyphs.spring_coil(start, end, _GLYPH_RADIUS_RATIO * self.radius)
-            yield Line(f"springs/{spring.name}", points, hinge_glyphs.SPRING_COLOUR)
+            points = geometry.spring_coil(start, end, _GLYPH_RADIUS_RATIO * self.radius)
+            yield Line(f"springs/{spring.name}", points, geometry.SPRING_COLOUR)
 
     def _end_paths(self, name: str) -> list[Array]:
         """Paths (f, 3) of the ends of an elastic body, one array for each end."""
@@ -255,7 +251,7 @@ class _SceneBuilder:
         """Label position of a body, in its axes."""
         flexible_body = self.run.model.flexible_bodies.get(name)
         if flexible_body is None or not flexible_body.ports:
-            return body_geometry.body_centre(body)
+            return geometry.body_centre(body)
         return np.mean([port.position for port in flexible_body.ports.values()], axis=0)
 
     # --- labels of the page -----------------------------------------------------------------------

@@ -9,8 +9,8 @@ import pytest
 
 import mstmm
 from mstmm.runtime.result.result import Result
-from mstmm.runtime.result.scene3d import arrows
 from mstmm.runtime.result.scene3d.scene_builder import build_scene_graph
+from mstmm.runtime.result.scene3d.solid_meshes import circular_arrows, straight_arrows
 
 ROD = {
     "name": "rod", "mass": 1.0, "center_of_mass": [0.5, 0, 0], "inertia": [0.001, 0.084, 0.084],
@@ -71,7 +71,7 @@ def test_a_force_at_a_mass_center_is_drawn_there() -> None:
 
 
 def test_turned_arrows_are_right_handed() -> None:
-    vertices, faces = arrows.circular_arrows(np.zeros((1, 3)), np.array([[0.0, 0.0, 2.0]]), 0.01)
+    vertices, faces = circular_arrows(np.zeros((1, 3)), np.array([[0.0, 0.0, 2.0]]), 0.01)
     middles = vertices[0].reshape(-1, 10, 3).mean(axis=1)
     angles = np.unwrap(np.arctan2(middles[:, 1], middles[:, 0]))
     assert np.all(np.diff(angles) >= -1e-12)
@@ -81,7 +81,7 @@ def test_turned_arrows_are_right_handed() -> None:
 
 
 def test_straight_arrows_are_closed_and_seen_from_outside() -> None:
-    vertices, faces = arrows.straight_arrows(np.zeros((1, 3)), np.array([[1.0, -2.0, 2.0]]), 0.05)
+    vertices, faces = straight_arrows(np.zeros((1, 3)), np.array([[1.0, -2.0, 2.0]]), 0.05)
     assert vertices[0, -1] == pytest.approx([1, -2, 2])
     area = 0.5 * 10 * np.sin(2 * np.pi / 10) * 0.05**2
     neck = 3.0 - 6 * 0.05

@@ -11,9 +11,9 @@ import mstmm
 from mstmm.errors import EnvironmentFailure, SceneError
 from mstmm.runtime.flexible.elastic.modal_elastic import elastic_model
 from mstmm.runtime.flexible.elastic.surface_mesh import MAX_NODES, skin
-from mstmm.runtime.result.scene3d import body_geometry
-from mstmm.runtime.result.scene3d.camera import FIELD_OF_VIEW, choose_camera
+from mstmm.runtime.result.scene3d import geometry
 from mstmm.runtime.result.scene3d.frame_times import natural_speed
+from mstmm.runtime.result.scene3d.projection import FIELD_OF_VIEW, choose_camera
 from mstmm.runtime.result.scene3d.scene_builder import build_scene_graph
 from tests.support.scenes import view as scenes
 
@@ -69,7 +69,7 @@ def test_the_box_of_equal_inertia_has_that_inertia() -> None:
         mass / 12 * (a * a + b * b),
     ]
     body = mstmm.scene.Body(name="block", mass=mass, inertia=inertia, center_of_mass=[1, 0, 0])
-    block = body_geometry.equal_inertia_box(body, 1.0)
+    block = geometry.equal_inertia_box(body, 1.0)
     assert block is not None
     edges = np.ptp(block.vertices, axis=0)
     assert edges == pytest.approx([a, b, c])

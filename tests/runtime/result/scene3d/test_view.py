@@ -12,10 +12,9 @@ import pytest
 from PIL import Image, ImageSequence
 
 from mstmm.errors import EnvironmentFailure
-from mstmm.runtime.result.scene3d.image_export import _column_count
 from mstmm.runtime.result.scene3d.projection import ProjectedFrame
 from mstmm.runtime.result.scene3d.scene_builder import build_scene_graph
-from mstmm.runtime.result.scene3d.view import SceneView
+from mstmm.runtime.result.scene3d.view import SceneView, _column_count
 from tests.support.scenes import view as scenes
 
 
