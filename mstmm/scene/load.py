@@ -24,15 +24,15 @@ from .robots.scene_from_robot import (
 from .robots.unit_conversion import Units, convert_units
 from .robots.urdf import read_urdf
 from .scene import Scene
-from .tables.elastic import SCENE_FOLDER
+from .validators.names_and_text import SCENE_FOLDER
 
 #: Largest file in MB by suffix.
-MAX_FILE_SIZES_MB = {".urdf": 16, ".xml": 16, ".mjcf": 16}
+_MAX_ROBOT_SIZES_MB = {".urdf": 16, ".xml": 16, ".mjcf": 16}
 
 
 def is_robot(path: str | os.PathLike[str]) -> bool:
     """Whether a file name has the suffix of a robot file."""
-    return os.path.splitext(os.fsdecode(path))[1].lower() in MAX_FILE_SIZES_MB
+    return os.path.splitext(os.fsdecode(path))[1].lower() in _MAX_ROBOT_SIZES_MB
 
 
 def import_robot(
@@ -59,7 +59,7 @@ def import_robot(
     if stops is not None and not _is_stiffness(stops):
         raise SceneError(f"stops: expected a stiffness above 0 in N m/rad or N/m, found {stops!r}")
     factors = Units.from_names(units)
-    where, content = read_content(path, MAX_FILE_SIZES_MB, "a robot's file")
+    where, content = read_content(path, _MAX_ROBOT_SIZES_MB, "a robot's file")
     absolute_path = Path(os.fsdecode(path)).absolute()
     if absolute_path.suffix.lower() == ".urdf":
         robot = read_urdf(content, where)

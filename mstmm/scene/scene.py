@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from contextvars import ContextVar
 from typing import Any, ClassVar
 
-from pydantic import ConfigDict, ValidationError, model_validator
+from pydantic import ConfigDict, ValidationError
 
 from ..argument_validation import abbreviate
 from ..display import NotebookDisplay, PublicMembers
@@ -24,7 +24,7 @@ from .files import to_toml
 from .tables.beam import ROOT
 from .tables.scene_tables import SceneTables, evaluate_constants
 from .validators import constant_expressions
-from .validators.scalars_and_vectors import ValidationProblems
+from .validators.scalars_and_vectors import Problem, ValidationProblems
 from .validators.validation_messages import TABLES, build_scene_error, scene_error
 
 #: Name of the scene that is being validated, for messages.
@@ -143,29 +143,19 @@ class Scene(PublicMembers, SceneTables, NotebookDisplay):
     def _tables(self) -> dict[str, Any]:
         return {table: getattr(self, table) for table in TABLES}
 
-    @model_validator(mode="after")
-    def _resolve_references(self) -> Scene:
+    def _check(self) -> None:
         for table in _AUTO_NAMED_TABLES:
-            object.__setattr__(self, table, _name_elements(table, getattr(self, table)))
-        for table, elements in _tables_with_beam_roots(self).items():
-            object.__setattr__(self, table, elements)
-        problems = consistency.problems(self)
-        if problems:
-            raise ValidationProblems(*problems)
-        return self
+            vars(self)[table] = _name_elements(table, getattr(self, table))
+        vars(self).update(_tables_with_beam_roots(self))
+
+    def _problems(self) -> list[Problem]:
+        return consistency.problems(self)
 
 
 #: Tables that a summary counts besides bodies and hinges; hinges that a notebook lists.
 _SUMMARY_TABLES = (
-    "beam",
-    "elastic",
-    "load",
-    "spring",
-    "bushing",
-    "constraint",
-    "coupling",
-    "event",
-)
+    "beam", "elastic", "load", "spring", "bushing", "constraint", "coupling", "event",
+)  # fmt: skip
 _MAX_LISTED_HINGES = 20
 _PLURALS = {"body": "bodies", "elastic": "elastic bodies", "bushing": "bushings"}
 

@@ -5,21 +5,23 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Annotated, Any
 
-from pydantic import BaseModel, Field, model_validator
+from pydantic import BaseModel, Field
 
 from ...expression.expression import Expression
 from ..validators import names_and_text as texts
 from ..validators import scalars_and_vectors as rules
 from ..validators.scalars_and_vectors import (
-    NAME_PATTERN,
     Location,
+    Problem,
     Shorthand,
     Table,
     ValidationProblems,
     count_text,
     describe_value,
+    is_integer,
     problem,
     to_python,
+    unexpected,
 )
 from ..validators.validation_messages import did_you_mean
 from .body import End
@@ -36,27 +38,36 @@ DIRECTIONS = ("y", "z", "twist", "axial")
 #: Most shapes in one direction.  For more, half-waves are too short for the theory, and products of
 #: shapes cannot be integrated accurately in double precision.
 MAX_SHAPES = 60
-SHAPE_COUNT_RULE = rules.Rule(
-    "a whole number, 0 or more",
-    lambda value: _check_count(value),
-    {"type": "integer", "minimum": 0},
-)
+#: Largest gap between pieces, and distance of ends from the beam, relative to its length.
+_MAX_RELATIVE_ROUNDING = 1e-9
+#: Largest relative difference of the polar inertia from the sum of both rotary inertias.
+_MAX_POLAR_DIFFERENCE = 1e-3
+#: Smallest mass, moment and stiffness of a beam, and the inverse of the largest.
+_MIN_MAGNITUDE = 1e-100
+#: Largest ratio between two pieces of a beam in mass or stiffness per length.
+_MAX_PIECE_RATIO = 1e12
 
 
-def _check_count(value: Any) -> int:
-    value = to_python(value)
-    if isinstance(value, bool) or not isinstance(value, int) or value < 0:
-        raise problem(f"expected {SHAPE_COUNT_RULE.expected}, found {describe_value(value)}")
-    return value
+# --- shapes ---------------------------------------------------------------------------------------
+
+_ShapeCount = Annotated[
+    int,
+    rules.value_rule(
+        "a whole number, 0 or more",
+        lambda value: is_integer(value) and value >= 0,
+        {"type": "integer", "minimum": 0},
+    ),
+]
+_ShapeList = Annotated[tuple[Expression, ...], texts.expressions_rule("a list of expressions of x")]
 
 
 class Modes(Table):
     """Number of shapes in each direction."""
 
-    y: Annotated[int, SHAPE_COUNT_RULE] = 0
-    z: Annotated[int, SHAPE_COUNT_RULE] = 0
-    twist: Annotated[int, SHAPE_COUNT_RULE] = 0
-    axial: Annotated[int, SHAPE_COUNT_RULE] = 0
+    y: _ShapeCount = 0
+    z: _ShapeCount = 0
+    twist: _ShapeCount = 0
+    axial: _ShapeCount = 0
 
     @property
     def counts(self) -> tuple[int, int, int, int]:
@@ -85,18 +96,17 @@ def _widen_modes(value: Any) -> Any:
         return None
     if value is None or isinstance(value, (dict, BaseModel)):
         return value
-    if isinstance(value, int) and not isinstance(value, bool):
+    if is_integer(value):
         return {"y": value, "z": value}
-    raise problem(f"expected {_MODES_DESCRIPTION}, found {describe_value(value)}")
+    raise unexpected(_MODES.expected, value)
 
 
-_MODES_DESCRIPTION = (
+_MODES = Shorthand(
     "a whole number of shapes per bending plane, a table { y, z, twist, axial } of whole "
-    'numbers, or "auto"'
+    'numbers, or "auto"',
+    _widen_modes,
+    {"type": ["integer", "string"]},
 )
-
-
-_MODES_RULE = Shorthand(_MODES_DESCRIPTION, _widen_modes, {"type": ["integer", "string"]})
 
 
 class Shapes(Table):
@@ -106,19 +116,18 @@ class Shapes(Table):
     twists in rad per rad.
     """
 
-    y: Annotated[tuple[Expression, ...], texts.expressions_rule("a list of expressions of x")] = ()
-    z: Annotated[tuple[Expression, ...], texts.expressions_rule("a list of expressions of x")] = ()
-    twist: Annotated[
-        tuple[Expression, ...], texts.expressions_rule("a list of expressions of x")
-    ] = ()
-    axial: Annotated[
-        tuple[Expression, ...], texts.expressions_rule("a list of expressions of x")
-    ] = ()
+    y: _ShapeList = ()
+    z: _ShapeList = ()
+    twist: _ShapeList = ()
+    axial: _ShapeList = ()
 
     @property
     def modes(self) -> Modes:
         """Number of shapes in each direction, as `Modes`."""
         return Modes(**{direction: len(getattr(self, direction)) for direction in DIRECTIONS})
+
+
+# --- sections -------------------------------------------------------------------------------------
 
 
 def _pair_rule(of: str) -> rules.Rule:
@@ -133,9 +142,7 @@ def _pair_rule(of: str) -> rules.Rule:
         for i, entry in enumerate(values):
             if entry <= 0:
                 location = (i,) if len(values) == 2 else ()
-                raise problem(
-                    f"expected {expected}, more than 0, found {describe_value(entry)}", *location
-                )
+                raise unexpected(f"{expected}, more than 0", entry, *location)
         return (values[0], values[-1])
 
     number = {"type": ["number", "string"], "exclusiveMinimum": 0}
@@ -165,13 +172,18 @@ class Section(SectionTable):
     to: Annotated[float, rules.number_rule("m", above=0)]
 
 
-def _widen_ends(value: Any) -> Any:
-    if not isinstance(value, dict):
-        raise problem(f"expected a table such as {{ mid = 5.0 }}, found {describe_value(value)}")
-    for key in value:
-        if not isinstance(key, str) or not NAME_PATTERN.fullmatch(key):
-            raise problem(f"expected the name of an end, found {describe_value(key)}")
-    return {key: _widen_end(end_value) for key, end_value in value.items()}
+#: Key of the section -> its meaning and unit.
+_KEY_DESCRIPTIONS = {
+    "mass_per_length": "a number in kg/m, more than 0",
+    "bending_stiffness": "E I in N m^2, more than 0: a number, or [about y, about z]",
+    "axial_stiffness": "E A in N, more than 0",
+    "torsional_stiffness": "G I_t in N m^2, more than 0",
+    "polar_inertia_per_length": "rho I_p in kg m, more than 0",
+    "rotary_inertia": "[rho I_y, rho I_z] in kg m, more than 0",
+}
+
+
+# --- beam -----------------------------------------------------------------------------------------
 
 
 def _widen_end(value: Any) -> Any:
@@ -179,38 +191,56 @@ def _widen_end(value: Any) -> Any:
     value = to_python(value)
     if isinstance(value, dict):
         position = to_python(value.get("position"))
-        if isinstance(position, (int, float, str)) and not isinstance(position, bool):
-            return {**value, "position": [position, 0.0, 0.0]}
-        return value
+        return {**value, "position": [position, 0.0, 0.0]} if _is_number(position) else value
     if isinstance(value, (list, tuple)):
         return {"position": value}
-    if isinstance(value, (int, float, str)) and not isinstance(value, bool):
-        return {"position": [value, 0.0, 0.0]}
-    return value
+    return {"position": [value, 0.0, 0.0]} if _is_number(value) else value
 
 
-class BeamKeys(FlexibleTable, SectionTable):
-    """Keys of a beam, before and after `Beam` resolves their defaults."""
+def _is_number(value: Any) -> bool:
+    """Whether a value is a number or the text of an expression."""
+    return isinstance(value, (int, float, str)) and not isinstance(value, bool)
+
+
+_ENDS = texts.ends_rule(
+    "ends by name: x in m, or a table with position and orientation",
+    "a table such as { mid = 5.0 }",
+    {"additionalProperties": {"type": ["number", "string", "array", "object"]}},
+    _widen_end,
+)
+
+
+class Beam(FlexibleTable, SectionTable):
+    """Euler-Bernoulli beam.
+
+    `modes` and `quadrature` are None for "auto".  `ends` also contains "root" and "tip".  Keys that
+    are left out in an entry of `section` have the value of the beam; `sections` are the completed
+    entries.
+    """
 
     length: Annotated[float, rules.number_rule("m", above=0)]
     section: tuple[Section, ...] = ()
-    modes: Annotated[Modes | None, _MODES_RULE] = None
+    modes: Annotated[Modes | None, _MODES] = None
     frame: Annotated[str, frame_field(AUTO, "tangent", "chord", "mean", at_end=True)] = AUTO
     basis: Annotated[str, texts.choice_rule(*BASES)] = AUTO
     shapes: Shapes | None = None
     quadrature: Annotated[bool | None, or_auto(texts.flag_rule())] = None
     viscous_drag: Annotated[float, rules.number_rule("N s/m^2", minimum=0)] = 0.0
-    ends: Annotated[
-        dict[str, End],
-        Shorthand(
-            "ends by name: x in m, or a table with position and orientation",
-            _widen_ends,
-            {
-                "type": "object",
-                "additionalProperties": {"type": ["number", "string", "array", "object"]},
-            },
-        ),
-    ] = Field(default_factory=dict)
+    ends: Annotated[dict[str, End], _ENDS] = Field(default_factory=dict)
+
+    def _check(self) -> None:
+        """Complete ends, basis and modes, and join pieces of the beam exactly."""
+        tip = (self.length, 0.0, 0.0)
+        ends = {ROOT: (0.0, 0.0, 0.0), TIP: tip}
+        default_ends = {name: End.model_construct(position=x) for name, x in ends.items()}
+        vars(self)["ends"] = default_ends | self.ends
+        if self.shapes is not None and self.basis == AUTO:
+            vars(self)["basis"] = GIVEN
+        if self.shapes is not None and self.modes is None:
+            vars(self)["modes"] = self.shapes.modes
+        if problems := tuple(_beam_problems(self)):
+            raise ValidationProblems(*problems)
+        vars(self)["section"] = _joined_sections(self)
 
     @property
     def sections(self) -> tuple[Section, ...]:
@@ -267,29 +297,10 @@ class BeamKeys(FlexibleTable, SectionTable):
 _SECTION_KEYS = tuple(SectionTable.model_fields)
 
 
-Problem = tuple[Location, str]
-
-#: Largest gap between pieces, and distance of ends from the beam, relative to its length.
-_MAX_RELATIVE_ROUNDING = 1e-9
-#: Largest relative difference of the polar inertia from the sum of both rotary inertias.
-_MAX_POLAR_DIFFERENCE = 1e-3
-#: Smallest mass, moment and stiffness of a beam, and the inverse of the largest.
-_MIN_MAGNITUDE = 1e-100
-#: Largest ratio between two pieces of a beam in mass or stiffness per length.
-_MAX_PIECE_RATIO = 1e12
-
-#: Key of the section -> its meaning and unit.
-_KEY_DESCRIPTIONS = {
-    "mass_per_length": "a number in kg/m, more than 0",
-    "bending_stiffness": "E I in N m^2, more than 0: a number, or [about y, about z]",
-    "axial_stiffness": "E A in N, more than 0",
-    "torsional_stiffness": "G I_t in N m^2, more than 0",
-    "polar_inertia_per_length": "rho I_p in kg m, more than 0",
-    "rotary_inertia": "[rho I_y, rho I_z] in kg m, more than 0",
-}
+# --- rules ----------------------------------------------------------------------------------------
 
 
-def problems(beam: BeamKeys) -> Iterator[Problem]:
+def _beam_problems(beam: Beam) -> Iterator[Problem]:
     """Problems of the keys of a beam with each other."""
     section_problems = list(_section_problems(beam))
     yield from section_problems
@@ -303,7 +314,7 @@ def problems(beam: BeamKeys) -> Iterator[Problem]:
     yield from _list_problems(beam)
 
 
-def joined_sections(beam: BeamKeys) -> tuple[Section, ...]:
+def _joined_sections(beam: Beam) -> tuple[Section, ...]:
     """Pieces of a beam, each starting exactly where the one before ends."""
     joined_pieces: list[Section] = []
     for k, piece in enumerate(beam.section):
@@ -313,7 +324,7 @@ def joined_sections(beam: BeamKeys) -> tuple[Section, ...]:
     return tuple(joined_pieces)
 
 
-def _section_problems(beam: BeamKeys) -> Iterator[Problem]:
+def _section_problems(beam: Beam) -> Iterator[Problem]:
     """Problems of pieces that do not cover the beam exactly once from root to tip."""
     covered_length, tolerance = 0.0, _MAX_RELATIVE_ROUNDING * beam.length
     for i, piece in enumerate(beam.section):
@@ -324,13 +335,13 @@ def _section_problems(beam: BeamKeys) -> Iterator[Problem]:
             )
             return
         if abs(piece.from_ - covered_length) > tolerance:
-            defect = "gap" if piece.from_ > covered_length else "overlap"
+            defect = "a gap" if piece.from_ > covered_length else "an overlap"
             boundary_text = "the beam begins" if i == 0 else "the previous piece ends"
             yield (
                 ("section", i, "from"),
                 f"expected {covered_length:g} m, where {boundary_text}, found {piece.from_:g}, "
-                f"{_with_article(defect)} of {abs(piece.from_ - covered_length):g} m; write from "
-                f"= {covered_length:g}",
+                f"{defect} of {abs(piece.from_ - covered_length):g} m; write from = "
+                f"{covered_length:g}",
             )
             return
         covered_length = piece.to
@@ -342,14 +353,7 @@ def _section_problems(beam: BeamKeys) -> Iterator[Problem]:
         )
 
 
-def _with_article(word: str) -> str:
-    return f"{'an' if word[0] in 'aeiou' else 'a'} {word}"
-
-
-# --- shapes and their required properties ---------------------------------------------------------
-
-
-def _mode_problems(beam: BeamKeys) -> Iterator[Problem]:
+def _mode_problems(beam: Beam) -> Iterator[Problem]:
     if beam.modes is None or beam.model == "rigid":
         return
     if beam.modes.total == 0:
@@ -368,31 +372,22 @@ def _mode_problems(beam: BeamKeys) -> Iterator[Problem]:
             )
 
 
-def _property_problems(beam: BeamKeys) -> Iterator[Problem]:
+def _property_problems(beam: Beam) -> Iterator[Problem]:
     """Problems of missing section properties, or of properties given only for some pieces."""
-    sections = beam.sections
-    for key, reason in _required_keys(beam).items():
-        for i, piece in enumerate(sections):
-            if getattr(piece, key) is None:
-                yield (
-                    _location_of(beam, i, key),
-                    f"missing; {reason}expected {_KEY_DESCRIPTIONS[key]}",
-                )
-                break
-    for key in _KEY_DESCRIPTIONS:
-        incomplete_indices = [i for i, piece in enumerate(sections) if getattr(piece, key) is None]
-        if 0 < len(incomplete_indices) < len(sections) and key not in _required_keys(beam):
-            yield (
-                _location_of(beam, incomplete_indices[0], key),
-                f"missing, though other pieces have it; expected {_KEY_DESCRIPTIONS[key]}",
-            )
+    sections, required = beam.sections, _required_keys(beam)
+    for key in (*required, *(key for key in _KEY_DESCRIPTIONS if key not in required)):
+        lacking = [i for i, piece in enumerate(sections) if getattr(piece, key) is None]
+        reason = f"; {required[key]}" if key in required else ", though other pieces have it; "
+        if lacking and (key in required or len(lacking) < len(sections)):
+            text = f"missing{reason}expected {_KEY_DESCRIPTIONS[key]}"
+            yield _location_of(beam, lacking[0], key), text
 
 
-def _location_of(beam: BeamKeys, i: int, key: str) -> Location:
+def _location_of(beam: Beam, i: int, key: str) -> Location:
     return ("section", i, key) if beam.section else (key,)
 
 
-def _required_keys(beam: BeamKeys) -> dict[str, str]:
+def _required_keys(beam: Beam) -> dict[str, str]:
     """Required keys, each with the reason as a prefix for messages."""
     required = {"mass_per_length": ""}
     if beam.model == "rigid":
@@ -408,44 +403,35 @@ def _required_keys(beam: BeamKeys) -> dict[str, str]:
     return required
 
 
-def _polar_inertia_problems(beam: BeamKeys) -> Iterator[Problem]:
+def _polar_inertia_problems(beam: Beam) -> Iterator[Problem]:
     """Problems of a polar inertia that is not the sum of both rotary inertias."""
     for i, piece in enumerate(beam.sections):
         polar, rotary = piece.polar_inertia_per_length, piece.rotary_inertia
-        if (
-            polar is None
-            or rotary is None
-            or abs(polar - sum(rotary)) <= _MAX_POLAR_DIFFERENCE * polar
-        ):
+        if polar is None or rotary is None:
             continue
-        yield (
-            _location_of(beam, i, "polar_inertia_per_length"),
-            f"expected the sum of both entries of rotary_inertia, {sum(rotary):g} kg m, as for "
-            f"every plane section, found {polar:g}; leave it out",
-        )
-        return
+        if abs(polar - sum(rotary)) > _MAX_POLAR_DIFFERENCE * polar:
+            yield (
+                _location_of(beam, i, "polar_inertia_per_length"),
+                f"expected the sum of both entries of rotary_inertia, {sum(rotary):g} kg m, as for "
+                f"every plane section, found {polar:g}; leave it out",
+            )
+            return
 
 
-def _magnitude_problems(beam: BeamKeys) -> Iterator[Problem]:
+def _magnitude_problems(beam: Beam) -> Iterator[Problem]:
     """Problems of a beam whose moments, stiffnesses or frequencies overflow or underflow."""
     if any(piece.mass_per_length is None for piece in beam.sections):
         return
-    length_squared, length_cubed = (
-        beam.length * beam.length,
-        beam.length * beam.length * beam.length,
-    )
+    length_squared = beam.length * beam.length
+    length_cubed = length_squared * beam.length
     sizes = [length_cubed, beam.mass, beam.mass * length_squared]
     for piece in beam.sections:
         stiffness = [EI / (length_cubed or 1) for EI in piece.bending_stiffness or ()]
         stiffness += [EA / beam.length for EA in (piece.axial_stiffness,) if EA is not None]
         sizes += [*stiffness, *(k / (beam.mass or 1) for k in stiffness)]
-        polar_inertia = piece.polar_inertia_per_length
-        for twist in (piece.torsional_stiffness,) if polar_inertia else ():
-            sizes += (
-                []
-                if twist is None
-                else [twist, twist / (polar_inertia or 1) / (length_squared or 1)]
-            )
+        polar_inertia, twist = piece.polar_inertia_per_length, piece.torsional_stiffness
+        if polar_inertia and twist is not None:
+            sizes += [twist, twist / polar_inertia / (length_squared or 1)]
     if not all(_MIN_MAGNITUDE < size < 1 / _MIN_MAGNITUDE for size in sizes):
         yield (
             ("length",),
@@ -456,15 +442,11 @@ def _magnitude_problems(beam: BeamKeys) -> Iterator[Problem]:
     yield from _ratio_problems(beam)
 
 
-def _ratio_problems(beam: BeamKeys) -> Iterator[Problem]:
+def _ratio_problems(beam: Beam) -> Iterator[Problem]:
     """Problems of pieces so different that shapes of one are lost to rounding of another."""
     for key in _KEY_DESCRIPTIONS:
-        section_values = [getattr(piece, key) for piece in beam.sections]
-        rows = [
-            entry if isinstance(entry, tuple) else (entry,)
-            for entry in section_values
-            if entry is not None
-        ]
+        values = [getattr(piece, key) for piece in beam.sections]
+        rows = [x if isinstance(x, tuple) else (x,) for x in values if x is not None]
         for column in zip(*rows, strict=True):
             smallest, largest = min(column), max(column)
             if smallest > 0 and largest > _MAX_PIECE_RATIO * smallest:
@@ -472,29 +454,26 @@ def _ratio_problems(beam: BeamKeys) -> Iterator[Problem]:
                 yield (
                     _location_of(beam, i, key),
                     f"expected {1 / _MAX_PIECE_RATIO:g} of the largest one, {largest:g}, or more, "
-                    f"found "
-                    f"{smallest:g}: the shapes of such a beam are linearly dependent to rounding; "
-                    "model the light part as a separate beam",
+                    f"found {smallest:g}: the shapes of such a beam are linearly dependent to "
+                    "rounding; model the light part as a separate beam",
                 )
                 return
 
 
-def _shape_problems(beam: BeamKeys) -> Iterator[Problem]:
+def _shape_problems(beam: Beam) -> Iterator[Problem]:
     shapes = beam.shapes
     if shapes is None:
-        if beam.basis == "given":
+        if beam.basis == GIVEN:
             yield ("shapes",), 'missing; basis = "given" needs shapes, as in { y = ["(x/L)^2"] }'
         return
-    if beam.basis != "given":
+    if beam.basis != GIVEN:
         yield (
             ("basis",),
             f'expected "given" with shapes, found "{beam.basis}"; leave out basis or shapes',
         )
     if beam.modes is not None and beam.modes != shapes.modes:
-        counts = ", ".join(
-            f"{word_} = {shape_count}"
-            for word_, shape_count in zip(DIRECTIONS, shapes.modes.counts, strict=True)
-        )
+        pairs = zip(DIRECTIONS, shapes.modes.counts, strict=True)
+        counts = ", ".join(f"{direction} = {count}" for direction, count in pairs)
         yield ("modes",), f"shapes has {counts}; leave out modes"
     for direction in DIRECTIONS:
         for i, expression in enumerate(getattr(shapes, direction)):
@@ -503,15 +482,12 @@ def _shape_problems(beam: BeamKeys) -> Iterator[Problem]:
                 yield ("shapes", direction, i), message
 
 
-# --- ends, frame, start values --------------------------------------------------------------------
-
-
-def _end_problems(beam: BeamKeys) -> Iterator[Problem]:
+def _end_problems(beam: Beam) -> Iterator[Problem]:
     tolerance = _MAX_RELATIVE_ROUNDING * beam.length
     for name, end in beam.ends.items():
         x, y, z = end.position
         location: Location = ("ends", name)
-        fixed_position = {"root": 0.0, "tip": beam.length}.get(name)
+        fixed_position = {ROOT: 0.0, TIP: beam.length}.get(name)
         if y or z:
             yield (
                 location,
@@ -538,20 +514,18 @@ def _end_problems(beam: BeamKeys) -> Iterator[Problem]:
         )
 
 
-def _list_problems(beam: BeamKeys) -> Iterator[Problem]:
+def _list_problems(beam: Beam) -> Iterator[Problem]:
     """Problems of lists that need one entry per shape."""
-    lists = [
-        (("initial", "eta"), beam.initial.eta),
-        (("initial", "etad"), beam.initial.etad),
-        (("damping", "ratio"), beam.damping.ratio if len(beam.damping.ratio) != 1 else None),
-    ]
-    for location, values in lists:
-        if values is None:
-            continue
-        names = beam.mode_names
-        if beam.modes is None:
+    lists = {
+        ("initial", "eta"): beam.initial.eta,
+        ("initial", "etad"): beam.initial.etad,
+        ("damping", "ratio"): beam.damping.ratio if len(beam.damping.ratio) != 1 else None,
+    }
+    names = beam.mode_names
+    for location, values in lists.items():
+        if values is not None and beam.modes is None:
             yield location, 'modes = "auto" chooses the number of shapes; give modes as numbers'
-        elif names is not None and len(values) != len(names):
+        elif values is not None and names is not None and len(values) != len(names):
             yield (
                 location,
                 f"expected {count_text(len(names))}, one per shape: {_names_text(names)}, "
@@ -562,33 +536,3 @@ def _list_problems(beam: BeamKeys) -> Iterator[Problem]:
 def _names_text(names: tuple[str, ...]) -> str:
     shown_names = ", ".join(names[:8])
     return f"{shown_names}, ..., {names[-1]}" if len(names) > 8 else shown_names or "none"
-
-
-class Beam(BeamKeys):
-    """Euler-Bernoulli beam.
-
-    `modes` and `quadrature` are None for "auto".  `ends` also contains "root" and "tip".  Keys that
-    are left out in an entry of `section` have the value of the beam; `sections` are the completed
-    entries.
-    """
-
-    @model_validator(mode="after")
-    def _resolve_ends_and_basis(self) -> Beam:
-        object.__setattr__(self, "ends", self._all_ends())
-        if self.shapes is not None and self.basis == AUTO:
-            object.__setattr__(self, "basis", GIVEN)
-        if self.shapes is not None and self.modes is None:
-            object.__setattr__(self, "modes", self.shapes.modes)
-        found = list(problems(self))
-        if found:
-            raise ValidationProblems(*found)
-        object.__setattr__(self, "section", joined_sections(self))
-        return self
-
-    def _all_ends(self) -> dict[str, End]:
-        default_positions = {ROOT: (0.0, 0.0, 0.0), TIP: (self.length, 0.0, 0.0)}
-        default_ends = {
-            name: End.model_construct(position=end_position)
-            for name, end_position in default_positions.items()
-        }
-        return default_ends | self.ends

@@ -2,34 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Self
+from collections.abc import Iterator
+from typing import Annotated, Any
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from ...numerics.rotations import IDENTITY, Matrix, Vector, from_orientation
 from ..validators import names_and_text as texts
-from ..validators import rotations_and_inertia
 from ..validators import scalars_and_vectors as rules
-from ..validators.rotations_and_inertia import without_rounding
-from ..validators.scalars_and_vectors import (
-    MAX_ENTRY,
-    NAME_PATTERN,
-    Location,
-    Numbers,
-    Orientation,
-    Shorthand,
-    Table,
-    ValidationProblems,
-    describe_value,
-    problem,
-)
+from ..validators.rotations_and_inertia import Orientation, inertia_rule, without_rounding
+from ..validators.scalars_and_vectors import MAX_ENTRY, Numbers, Position, Problem, Table
 
 
 class End(Table):
     """Output end of a body: position (m) and orientation in body axes."""
 
-    position: Annotated[Vector, rules.vector_rule("m")]
-    orientation: Annotated[Orientation, rotations_and_inertia.orientation_rule()] = (0.0, 0.0, 0.0)
+    position: Position
+    orientation: Orientation = (0.0, 0.0, 0.0)
 
     @property
     def rotation(self) -> Matrix:
@@ -42,15 +31,12 @@ def widen_end(value: Any) -> Any:
     return {"position": value} if isinstance(value, (list, tuple)) else value
 
 
-def _widen_ends(value: Any) -> Any:
-    if not isinstance(value, dict):
-        raise problem(
-            f"expected a table such as {{ tip = [1, 0, 0] }}, found {describe_value(value)}"
-        )
-    for key in value:
-        if not isinstance(key, str) or not NAME_PATTERN.fullmatch(key):
-            raise problem(f"expected the name of an end, found {describe_value(key)}")
-    return {key: widen_end(v) for key, v in value.items()}
+_ENDS = texts.ends_rule(
+    "output ends: name -> [x, y, z] in m, or a table with position and orientation",
+    "a table such as { tip = [1, 0, 0] }",
+    {"additionalProperties": {"type": "array"}},
+    widen_end,
+)
 
 
 class BodyTable(Table):
@@ -62,25 +48,11 @@ class BodyTable(Table):
 
     type: Annotated[str, texts.name_rule("a body type")] = "rigid"
     mass: Annotated[float, rules.number_rule("kg", minimum=0)] = 0.0
-    center_of_mass: Annotated[Vector, rules.vector_rule("m")] = (0.0, 0.0, 0.0)
-    inertia: Annotated[Numbers, rotations_and_inertia.inertia_rule()] = (
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-    )
-    allow_unphysical_inertia: Annotated[bool, texts.flag_rule()] = False
-    ends: Annotated[
-        dict[str, End],
-        Shorthand(
-            "output ends: name -> [x, y, z] in m, or a table with position and orientation",
-            _widen_ends,
-            {"type": "object", "additionalProperties": {"type": "array"}},
-        ),
-    ] = Field(default_factory=dict)
-    parameters: Annotated[dict[str, float], texts.parameters_rule()] = Field(default_factory=dict)
+    center_of_mass: Position = (0.0, 0.0, 0.0)
+    inertia: Annotated[Numbers, inertia_rule()] = (0.0,) * 6
+    allow_unphysical_inertia: texts.Flag = False
+    ends: Annotated[dict[str, End], _ENDS] = Field(default_factory=dict)
+    parameters: texts.Parameters = Field(default_factory=dict)
 
     @property
     def inertia_matrix(self) -> Matrix:
@@ -99,24 +71,21 @@ class BodyTable(Table):
         """Rotation matrix from axes of the end `at` to body axes."""
         return self.ends[at].rotation if at else IDENTITY
 
-    @model_validator(mode="after")
-    def _settle(self) -> Self:
+    def _check(self) -> None:
         if len(self.inertia) == 3:
-            object.__setattr__(self, "inertia", (*self.inertia, 0.0, 0.0, 0.0))
-        problems: list[tuple[Location, str]] = []
+            vars(self)["inertia"] = (*self.inertia, 0.0, 0.0, 0.0)
+
+    def _problems(self) -> Iterator[Problem]:
         if self.type == "rigid" and "mass" not in self.model_fields_set:
-            problems.append((("mass",), "missing; expected a number in kg, 0 or more"))
+            yield ("mass",), "missing; expected a number in kg, 0 or more"
         if self.type == "rigid" and self.parameters:
             remedy = "set type to your user-defined type"
-            problems.append((("parameters",), f"a rigid body has no parameters; {remedy}"))
+            yield ("parameters",), f"a rigid body has no parameters; {remedy}"
         moment = float(self.mass) * sum(float(x) ** 2 for x in self.center_of_mass)
         if not max(float(self.mass), moment, *(abs(float(x)) for x in self.inertia)) <= MAX_ENTRY:
             limit = f"at most {MAX_ENTRY:g} kg and kg m^2, above which products overflow"
             quantities = "mass, mass times the square of center_of_mass, and inertia"
-            problems.append((("mass",), f"expected {quantities}: {limit}"))
-        if problems:
-            raise ValidationProblems(*problems)
-        return self
+            yield ("mass",), f"expected {quantities}: {limit}"
 
 
 class Body(BodyTable):

@@ -3,148 +3,31 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Annotated, Any
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from ...numerics.rotations import Matrix, Vector, from_orientation
-from ..validators import names_and_text as texts
-from ..validators import rotations_and_inertia
-from ..validators import scalars_and_vectors as rules
+from ...numerics.rotations import Matrix, from_orientation
+from ..validators.names_and_text import Flag, Reference, check_two_ends, name_rule
+from ..validators.rotations_and_inertia import Orientation
 from ..validators.scalars_and_vectors import (
-    GROUND,
     NUMBER_SCHEMA,
     Numbers,
-    Orientation,
+    Position,
     Rule,
     Shorthand,
     Table,
     check_entries,
     count_text,
     describe_value,
+    numbers_rule,
     problem,
     require_finite,
     require_list,
-    split_reference,
     to_python,
 )
 from .body import End, widen_end
-
-_SIX_ZEROS = (0.0,) * 6
-#: Positions of the translational entries in the upper triangle of a 6 x 6 matrix.
-_TRANSLATION_POSITIONS = (0, 1, 2, 6, 7, 11)
-
-
-class Bushing(Table):
-    """Spring and damper in all six directions: load preload - K e - C e' on `to`.
-
-    The reaction acts on `from`.  The bushing's axes are those of the end `from` (inertial axes for
-    the ground), rotated by `orientation`.  The deflection e is the displacement of `to` from `rest`
-    (x, y, z in m) with its rotation vector (rad), below 170 degrees.  `rest` is the undeformed pose
-    of the end `to` in the bushing's axes; by default it is that of `from`.  `position` (m) is the
-    position of an end on the ground.
-
-    With `conservative` false any matrices are accepted, such as those of a journal bearing or a
-    seal.  The load -N e of the antisymmetric part N of K then has no potential and counts as work.
-    """
-
-    name: Annotated[str, texts.name_rule("the bushing's name")] = ""
-    from_: Annotated[str, texts.end_rule()] = Field(alias="from")
-    to: Annotated[str, texts.end_rule()]
-    position: Annotated[Vector, rules.vector_rule("m")] = (0.0, 0.0, 0.0)
-    orientation: Annotated[Orientation, rotations_and_inertia.orientation_rule()] = (0.0, 0.0, 0.0)
-    rest: Annotated[
-        End,
-        Shorthand(
-            "[x, y, z] in m, or a table with position and orientation", widen_end, {"type": "array"}
-        ),
-    ] = End(position=(0.0, 0.0, 0.0))
-    stiffness: Annotated[Numbers, matrix_6x6("N/m", "N m/rad")] = _SIX_ZEROS
-    damping: Annotated[Numbers, matrix_6x6("N s/m", "N m s/rad")] = _SIX_ZEROS
-    preload: Annotated[
-        Numbers, rules.numbers_rule("three forces in N and three moments in N m", 6)
-    ] = _SIX_ZEROS
-
-    conservative: Annotated[bool, texts.flag_rule()] = True
-
-    @model_validator(mode="after")
-    def _check(self) -> Bushing:
-        bodies = (split_reference(self.from_)[0], split_reference(self.to)[0])
-        if bodies[0] == bodies[1]:
-            raise problem(
-                f'both ends are on "{bodies[0]}", so it has no effect; connect two bodies', "to"
-            )
-        if GROUND not in bodies and self.position != (0.0, 0.0, 0.0):
-            raise problem(
-                "only a bushing on the ground has a position; define an end of the body there",
-                "position",
-            )
-        if not any((*self.stiffness, *self.damping, *self.preload)):
-            raise problem("missing; a bushing needs stiffness, damping or a preload", "stiffness")
-        if self.conservative:
-            check_conservative(self.stiffness, "stiffness")
-            check_conservative(self.damping, "damping")
-        return self
-
-    @property
-    def rotation(self) -> Matrix:
-        """Rotation matrix from bushing axes to axes of the end `from`."""
-        return from_orientation(self.orientation)
-
-    @property
-    def numbers(self) -> Numbers:
-        """Parameters of the force element: stiffness, damping and preload."""
-        given_matrices, preload = (self.stiffness, self.damping), self.preload
-        symmetric_entries, antisymmetric_entries = (
-            tuple(x for given_matrix in given_matrices for x in part_of(given_matrix))
-            for part_of in (upper_triangle, antisymmetric_part)
-        )
-        if self.element == "bearing3":
-            symmetric_entries = tuple(
-                given_matrix[k]
-                for given_matrix in map(upper_triangle, given_matrices)
-                for k in _TRANSLATION_POSITIONS
-            )
-            antisymmetric_entries = tuple(
-                given_matrix[k]
-                for given_matrix in map(antisymmetric_part, given_matrices)
-                for k in (0, 1, 5)
-            )
-            preload = preload[:3]
-        parameter_values = (*symmetric_entries, *preload)
-        return (
-            parameter_values if self.conservative else (*parameter_values, *antisymmetric_entries)
-        )
-
-    @property
-    def element(self) -> str:
-        """Name of the force element; one without moments, whose ends may spin, where possible."""
-        if self.conservative:
-            return "bushing6"
-        moments = (matrix[i][j] for matrix in map(full_matrix, (self.stiffness, self.damping))
-                   for i in range(6) for j in range(6) if max(i, j) > 2)  # fmt: skip
-        return "bearing6" if any((*moments, *self.preload[3:])) else "bearing3"
-
-    @property
-    def stiffest(self) -> tuple[float, float]:
-        """Largest stiffness along axes (N/m) and about them (N m/rad)."""
-        return _largest_entries(self.stiffness)
-
-    @property
-    def most_damped(self) -> tuple[float, float]:
-        """Largest damping along axes (N s/m) and about them (N m s/rad)."""
-        return _largest_entries(self.damping)
-
-
-def _largest_entries(given: Numbers) -> tuple[float, float]:
-    matrix = full_matrix(given)
-    translations, rotations = ([abs(matrix[i][j]) for i in indices for j in indices]
-                    for indices in (range(3), range(3, 6)))  # fmt: skip
-    return max(translations), max(rotations)
-
-
-# --- 6 x 6 matrices -------------------------------------------------------------------------------
-
 
 _ROWS_RANGE = range(6)
 #: (row, column) of the upper triangle, row by row.
@@ -154,8 +37,6 @@ UPPER_PAIRS = tuple((i, j) for i in _ROWS_RANGE for j in _ROWS_RANGE if i <= j)
 _MAX_RELATIVE_ROUNDING = 1e-12
 
 _AXIS_LABELS = ("along x", "along y", "along z", "about x", "about y", "about z")
-
-Triangle = tuple[float, ...]
 
 #: Positions of a 2 x 2 matrix along y and z in the 36 entries of a 6 x 6 matrix.
 _BENDING_POSITIONS = (7, 8, 13, 14)
@@ -174,7 +55,7 @@ def matrix_6x6(linear: str, angular: str) -> Rule:
         "the upper triangle of a symmetric one, or 2 rows of 2 along y and z"
     )
 
-    def check(value: Any) -> Triangle:
+    def check(value: Any) -> Numbers:
         entries = require_list(value, expected)
         nested = all(isinstance(to_python(row), (list, tuple)) for row in entries)
         if len(entries) in (2, 6) and nested:
@@ -208,19 +89,19 @@ def _check_row(row: Any, i: int, n: int, expected: str) -> tuple[float, ...]:
     return tuple(require_finite(to_python(x), "a number", i, j) for j, x in enumerate(entries))
 
 
-def _embed_bending_matrix(flat: Triangle) -> Triangle:
+def _embed_bending_matrix(flat: Numbers) -> Numbers:
     entries = [0.0] * _ENTRY_COUNT
     for position, entry in zip(_BENDING_POSITIONS, flat, strict=True):
         entries[position] = entry
     return tuple(entries)
 
 
-def _shortest_form(flat: Triangle) -> Triangle:
+def _shortest_form(flat: Numbers) -> Numbers:
     """Shortest form of a matrix: its upper triangle if it is symmetric, else all 36 entries."""
     return flat if _first_asymmetric_pair(flat) else tuple(flat[6 * i + j] for i, j in UPPER_PAIRS)
 
 
-def _first_asymmetric_pair(flat: Triangle) -> tuple[int, int] | None:
+def _first_asymmetric_pair(flat: Numbers) -> tuple[int, int] | None:
     """Row and column of the first pair of entries that differ across the diagonal."""
     for i, j in UPPER_PAIRS:
         upper, lower = flat[6 * i + j], flat[6 * j + i]
@@ -229,7 +110,7 @@ def _first_asymmetric_pair(flat: Triangle) -> tuple[int, int] | None:
     return None
 
 
-def full_matrix(given: Triangle) -> list[list[float]]:
+def full_matrix(given: Numbers) -> list[list[float]]:
     """Full 6 x 6 matrix from its diagonal, its upper triangle or all its entries."""
     if len(given) == _ENTRY_COUNT:
         return [list(given[6 * i : 6 * i + 6]) for i in _ROWS_RANGE]
@@ -240,7 +121,7 @@ def full_matrix(given: Triangle) -> list[list[float]]:
     return matrix
 
 
-def upper_triangle(given: Triangle) -> Triangle:
+def upper_triangle(given: Numbers) -> Numbers:
     """Upper triangle (21,) of the symmetric part of a matrix, row by row."""
     matrix = full_matrix(given)
     return tuple(
@@ -249,13 +130,13 @@ def upper_triangle(given: Triangle) -> Triangle:
     )
 
 
-def antisymmetric_part(given: Triangle) -> Triangle:
+def antisymmetric_part(given: Numbers) -> Numbers:
     """Antisymmetric part (15,) of a matrix above the diagonal, row by row."""
     matrix = full_matrix(given)
     return tuple((matrix[i][j] - matrix[j][i]) / 2 for i, j in UPPER_PAIRS if i != j)
 
 
-def check_conservative(given: Triangle, what: str) -> None:
+def check_conservative(given: Numbers, what: str) -> None:
     """Reject a matrix that is not symmetric or has a negative eigenvalue.  Raises Refused."""
     pair = _first_asymmetric_pair(given) if len(given) == _ENTRY_COUNT else None
     if pair is not None:
@@ -299,3 +180,98 @@ def _negative_pivot_row(matrix: list[list[float]]) -> int | None:
             for j in remaining:
                 scaled[i][j] -= scaled[i][k] * scaled[k][j] / pivot
     return None
+
+
+# --- table ----------------------------------------------------------------------------------------
+
+_SIX_ZEROS = (0.0,) * 6
+#: Positions of the translational entries in the upper triangle of a 6 x 6 matrix, with its diagonal
+#: and without it.
+_TRANSLATIONS, _ANTISYMMETRIC_TRANSLATIONS = (0, 1, 2, 6, 7, 11), (0, 1, 5)
+
+
+class Bushing(Table):
+    """Spring and damper in all six directions: load preload - K e - C e' on `to`.
+
+    The reaction acts on `from`.  The bushing's axes are those of the end `from` (inertial axes for
+    the ground), rotated by `orientation`.  The deflection e is the displacement of `to` from `rest`
+    (x, y, z in m) with its rotation vector (rad), below 170 degrees.  `rest` is the undeformed pose
+    of the end `to` in the bushing's axes; by default it is that of `from`.  `position` (m) is the
+    position of an end on the ground.
+
+    With `conservative` false any matrices are accepted, such as those of a journal bearing or a
+    seal.  The load -N e of the antisymmetric part N of K then has no potential and counts as work.
+    """
+
+    name: Annotated[str, name_rule("the bushing's name")] = ""
+    from_: Reference = Field(alias="from")
+    to: Reference
+    position: Position = (0.0, 0.0, 0.0)
+    orientation: Orientation = (0.0, 0.0, 0.0)
+    rest: Annotated[
+        End,
+        Shorthand(
+            "[x, y, z] in m, or a table with position and orientation", widen_end, {"type": "array"}
+        ),
+    ] = End(position=(0.0, 0.0, 0.0))
+    stiffness: Annotated[Numbers, matrix_6x6("N/m", "N m/rad")] = _SIX_ZEROS
+    damping: Annotated[Numbers, matrix_6x6("N s/m", "N m s/rad")] = _SIX_ZEROS
+    preload: Annotated[Numbers, numbers_rule("three forces in N and three moments in N m", 6)] = (
+        _SIX_ZEROS
+    )
+    conservative: Flag = True
+
+    def _check(self) -> None:
+        check_two_ends(self, "a bushing", ", so it has no effect")
+        if not any((*self.stiffness, *self.damping, *self.preload)):
+            raise problem("missing; a bushing needs stiffness, damping or a preload", "stiffness")
+        if self.conservative:
+            check_conservative(self.stiffness, "stiffness")
+            check_conservative(self.damping, "damping")
+
+    @property
+    def rotation(self) -> Matrix:
+        """Rotation matrix from bushing axes to axes of the end `from`."""
+        return from_orientation(self.orientation)
+
+    @property
+    def numbers(self) -> Numbers:
+        """Parameters of the force element: stiffness, damping and preload."""
+        matrices, preload = (self.stiffness, self.damping), self.preload
+        symmetric: Sequence[int] = range(len(UPPER_PAIRS))
+        antisymmetric: Sequence[int] = range(15)
+        if self.element == "bearing3":
+            symmetric, antisymmetric = _TRANSLATIONS, _ANTISYMMETRIC_TRANSLATIONS
+            preload = preload[:3]
+        numbers = [triangle[k] for triangle in map(upper_triangle, matrices) for k in symmetric]
+        numbers += preload
+        if not self.conservative:
+            parts = map(antisymmetric_part, matrices)
+            numbers += (part[k] for part in parts for k in antisymmetric)
+        return tuple(numbers)
+
+    @property
+    def element(self) -> str:
+        """Name of the force element; one without moments, whose ends may spin, where possible."""
+        if self.conservative:
+            return "bushing6"
+        moments = (matrix[i][j] for matrix in map(full_matrix, (self.stiffness, self.damping))
+                   for i in range(6) for j in range(6) if max(i, j) > 2)  # fmt: skip
+        return "bearing6" if any((*moments, *self.preload[3:])) else "bearing3"
+
+    @property
+    def stiffest(self) -> tuple[float, float]:
+        """Largest stiffness along axes (N/m) and about them (N m/rad)."""
+        return _largest_entries(self.stiffness)
+
+    @property
+    def most_damped(self) -> tuple[float, float]:
+        """Largest damping along axes (N s/m) and about them (N m s/rad)."""
+        return _largest_entries(self.damping)
+
+
+def _largest_entries(given: Numbers) -> tuple[float, float]:
+    matrix = full_matrix(given)
+    translations, rotations = ([abs(matrix[i][j]) for i in indices for j in indices]
+                    for indices in (range(3), range(3, 6)))  # fmt: skip
+    return max(translations), max(rotations)

@@ -12,20 +12,17 @@ from itertools import accumulate
 from math import lcm
 from typing import Annotated, Any, Generic, TypeVar, overload
 
-from pydantic import BaseModel, model_validator
+from pydantic import BaseModel
 
-from ...numerics.rotations import Vector
 from ..validators import names_and_text as texts
-from ..validators import rotations_and_inertia
 from ..validators import scalars_and_vectors as rules
+from ..validators.rotations_and_inertia import orientation_rule
 from ..validators.scalars_and_vectors import (
     GROUND,
     NAME_PATTERN,
-    Location,
-    Orientation,
+    Problem,
     Shorthand,
     Table,
-    ValidationProblems,
     problem,
     split_reference,
 )
@@ -62,9 +59,9 @@ class Chain(Table):
 
     name: Annotated[str, texts.name_rule("the chain's name")]
     count: Annotated[int, rules.integer(1, MAX_CHAIN_COUNT)]
-    inboard: Annotated[str, texts.end_rule()]
-    position: Annotated[Vector, rules.vector_rule("m")] = (0.0, 0.0, 0.0)
-    orientation: Annotated[Orientation | None, rotations_and_inertia.orientation_rule()] = None
+    inboard: texts.Reference
+    position: rules.Position = (0.0, 0.0, 0.0)
+    orientation: Annotated[rules.Numbers | None, orientation_rule()] = None
     end: Annotated[str | None, texts.name_rule("the end that connects to the next body")] = None
     body: Annotated[tuple[BodyTable, ...], _pattern_rule("body")]
     hinge: Annotated[tuple[HingeTable, ...], _pattern_rule("hinge")]
@@ -98,14 +95,7 @@ class Chain(Table):
             return self.inboard
         return f"{self.name}[{k - 1}].{self.held_ends[(k - 1) % len(self.body)]}"
 
-    @model_validator(mode="after")
-    def _check(self) -> Chain:
-        problems = [*self._position_problems(), *self._count_problems(), *self._ends()]
-        if problems:
-            raise ValidationProblems(*problems)
-        return self
-
-    def _position_problems(self) -> Iterator[tuple[Location, str]]:
+    def _problems(self) -> Iterator[Problem]:
         inboard_body = split_reference(self.inboard)[0]
         if inboard_body != GROUND and self.position != (0.0, 0.0, 0.0):
             yield (
@@ -113,8 +103,6 @@ class Chain(Table):
                 'only a chain with inboard = "ground" has a position; '
                 f'define an end of "{inboard_body}" there',
             )
-
-    def _count_problems(self) -> Iterator[tuple[Location, str]]:
         for key in ("body", "hinge"):
             tables = len(getattr(self, key))
             if tables > self.count:
@@ -122,8 +110,9 @@ class Chain(Table):
                     (key,),
                     f"{tables} tables for a chain of {self.count}; leave some out or raise count",
                 )
+        yield from self._end_problems()
 
-    def _ends(self) -> Iterator[tuple[Location, str]]:
+    def _end_problems(self) -> Iterator[Problem]:
         """Problems of the ends that connect to the next member."""
         connecting_count = min(self.count - 1, len(self.body))
         for i, body in enumerate(self.body):

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from ...expression.expression import Expression, Name
 from ...numerics.rotations import Vector, unit_vector
 from ..validators import names_and_text as texts
 from ..validators import scalars_and_vectors as rules
-from ..validators.scalars_and_vectors import GROUND, Table, problem, split_reference
+from ..validators.names_and_text import check_two_ends
+from ..validators.scalars_and_vectors import GROUND, Position, Table, problem, split_reference
 
 DISTANCE, PLANE, CURVE, ROLLING = "distance", "point-on-plane", "point-on-curve", "rolling"
 #: Required and optional keys of each type, besides the common ones.
@@ -40,9 +41,9 @@ class Constraint(Table):
 
     name: Annotated[str, texts.name_rule("the constraint's name")] = ""
     type: Annotated[str, texts.choice_rule(*_KEYS_BY_TYPE)]
-    from_: Annotated[str, texts.end_rule()] = Field(alias="from")
-    to: Annotated[str, texts.end_rule()]
-    position: Annotated[Vector, rules.vector_rule("m")] = (0.0, 0.0, 0.0)
+    from_: texts.Reference = Field(alias="from")
+    to: texts.Reference
+    position: Position = (0.0, 0.0, 0.0)
     length: Annotated[float | None, rules.number_rule("m", above=0)] = None
     normal: Annotated[Vector | None, rules.direction_rule()] = None
     offset: Annotated[float | None, rules.number_rule("m")] = None
@@ -54,16 +55,8 @@ class Constraint(Table):
     radius: Annotated[float | None, rules.number_rule("m", above=0)] = None
     axis: Annotated[Vector | None, rules.direction_rule()] = None
 
-    @model_validator(mode="after")
-    def _check(self) -> Constraint:
-        bodies = (split_reference(self.from_)[0], split_reference(self.to)[0])
-        if bodies[0] == bodies[1]:
-            raise problem(f'both ends are on "{bodies[0]}"; connect two bodies', "to")
-        if GROUND not in bodies and self.position != (0.0, 0.0, 0.0):
-            raise problem(
-                "only a constraint on the ground has a position; define an end of the body there",
-                "position",
-            )
+    def _check(self) -> None:
+        check_two_ends(self, "a constraint")
         required_keys, optional_keys = _KEYS_BY_TYPE[self.type]
         for key in _TYPE_KEYS:
             if getattr(self, key) is not None and key not in (*required_keys, *optional_keys):
@@ -71,9 +64,8 @@ class Constraint(Table):
         for key in required_keys:
             if getattr(self, key) is None:
                 raise problem(f"missing; expected {_KEY_DESCRIPTIONS[key].format(self.from_)}", key)
-        if self.type == ROLLING and bodies[1] == GROUND:
+        if self.type == ROLLING and split_reference(self.to)[0] == GROUND:
             raise problem("expected a body, found the ground; swap from and to", "to")
-        return self
 
     @property
     def unit_normal(self) -> Vector | None:
@@ -122,15 +114,13 @@ class Coupling(Table):
         Expression | None, texts.expression_rule("a number or an expression of t")
     ] = None
 
-    @model_validator(mode="after")
-    def _check(self) -> Coupling:
+    def _check(self) -> None:
         if self.expression is None and self.speeds is None:
             raise problem("missing; give expression or speeds", "expression")
         if self.expression is not None and self.speeds is not None:
             raise problem(
                 "expected expression or speeds, found both; define two couplings", "speeds"
             )
-        return self
 
     @property
     def key(self) -> str:

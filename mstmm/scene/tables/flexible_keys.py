@@ -5,22 +5,20 @@ from __future__ import annotations
 import re
 from typing import Annotated, Any
 
-from pydantic import model_validator
-
 from ..validators import names_and_text as texts
 from ..validators import scalars_and_vectors as rules
 from ..validators.scalars_and_vectors import (
     NAME_PATTERN,
+    Numbers,
     Rule,
     Shorthand,
     Table,
     ValidationProblems,
-    describe_value,
     problem,
     to_python,
+    unexpected,
+    value_rule,
 )
-
-Numbers = tuple[float, ...]
 
 #: Model levels: coupled with the rigid motion; no deformation; rigid motion first, then the linear
 #: elastic response to it.
@@ -41,11 +39,9 @@ class Damping(Table):
     ] = (0.0,)
     stiffness: Annotated[float, rules.number_rule("s", minimum=0)] = 0.0
 
-    @model_validator(mode="after")
-    def _check(self) -> Damping:
+    def _check(self) -> None:
         if not self.ratio:
             raise problem("expected a modal damping ratio or more, found an empty list", "ratio")
-        return self
 
     @property
     def acts(self) -> bool:
@@ -71,18 +67,16 @@ class InitialDeformation(Table):
     With `static` it is the static deformation under the loads at t = 0.
     """
 
-    static: Annotated[bool, texts.flag_rule()] = False
+    static: texts.Flag = False
     eta: Annotated[Numbers | None, rules.numbers_rule("one number per shape")] = None
     etad: Annotated[Numbers | None, rules.numbers_rule("one number per shape")] = None
 
-    @model_validator(mode="after")
-    def _check(self) -> InitialDeformation:
+    def _check(self) -> None:
         if self.static and self.eta is not None:
             raise problem("static already gives the deformation; leave one of them out", "eta")
         for key in ("eta", "etad"):
             if getattr(self, key) == ():
                 raise problem("expected one number per shape, found none; leave it out", key)
-        return self
 
 
 _START_SHORTHANDS: dict[str, dict[str, Any]] = {"undeformed": {}, "static": {"static": True}}
@@ -93,7 +87,7 @@ def _widen_start(value: Any) -> Any:
         return value
     if value not in _START_SHORTHANDS:
         expected = '"undeformed", "static" or a table { eta, etad }'
-        raise problem(f"expected {expected}, found {describe_value(value)}")
+        raise unexpected(expected, value)
     return _START_SHORTHANDS[value]
 
 
@@ -110,17 +104,14 @@ def frame_field(*words: str, at_end: bool = False) -> Rule:
     if at_end:
         expected += ' ("tangent@mid": at that end, else at the end of the inboard hinge)'
 
-    def check(value: Any) -> str:
-        if isinstance(value, str) and (
-            value in words or (at_end and _TANGENT.fullmatch(value) is not None)
-        ):
-            return str(value)
-        raise problem(f"expected {expected}, found {describe_value(value)}")
+    def accepts(value: Any) -> bool:
+        is_tangent = at_end and isinstance(value, str) and _TANGENT.fullmatch(value) is not None
+        return is_tangent or value in words
 
     forms: list[dict[str, Any]] = [{"enum": list(words)}]
     if at_end:
         forms.append({"type": "string", "pattern": f"^{_TANGENT.pattern}$"})
-    return Rule(expected, check, {"anyOf": forms})
+    return value_rule(expected, accepts, {"anyOf": forms}, str)
 
 
 def or_auto(rule: Rule) -> Rule:
@@ -131,14 +122,12 @@ def or_auto(rule: Rule) -> Rule:
         if isinstance(value, str):
             if value == AUTO:
                 return None
-            raise problem(f"expected {expected}, found {describe_value(value)}")
+            raise unexpected(expected, value)
         try:
             return rule.check(value)
         except ValidationProblems as refused:
             if all(not location for location, _ in refused.problems):
-                raise problem(
-                    f"expected {expected}, found {describe_value(to_python(value))}"
-                ) from None
+                raise unexpected(expected, to_python(value)) from None
             raise
 
     return Rule(expected, check, {"anyOf": [rule.schema, {"const": AUTO}]})
@@ -151,7 +140,7 @@ class FlexibleTable(Table):
     """
 
     name: Annotated[str, texts.name_rule("the body's name")]
-    stiffening: Annotated[bool, texts.flag_rule()] = True
+    stiffening: texts.Flag = True
     damping: Annotated[Damping, DAMPING] = Damping()
     initial: Annotated[InitialDeformation, START] = InitialDeformation()
     model: Annotated[str, texts.choice_rule(*MODELS)] = MODELS[0]

@@ -18,10 +18,10 @@ from ...numerics.rotations import (
     perpendicular_vector,
     unit_rejection,
 )
-from .hinge import HingeKeys
+from .hinge import HingeTable
 
 
-def hinge_frames(hinge: HingeKeys) -> tuple[Matrix, Matrix]:
+def hinge_frames(hinge: HingeTable) -> tuple[Matrix, Matrix]:
     """Inboard and outboard axes of the hinge kernel in the axes of the outboard end at q = 0."""
     frame = "axis" if hinge.facts is None else hinge.facts.frame
     if frame == "own":
@@ -33,12 +33,12 @@ def hinge_frames(hinge: HingeKeys) -> tuple[Matrix, Matrix]:
     return aligned, aligned
 
 
-def twist_axes(hinge: HingeKeys) -> Matrix:
+def twist_axes(hinge: HingeTable) -> Matrix:
     """Axes in which a law decomposes a rotation: twist about z, the axis of the hinge."""
     return axes_about(hinge.unit_axis, None)
 
 
-def parameters_from_keys(hinge: HingeKeys) -> dict[str, float]:
+def parameters_from_keys(hinge: HingeTable) -> dict[str, float]:
     """Kernel parameters by name that follow from keys of the hinge, such as lead or axis angle."""
     facts = hinge.facts
     if facts is None:
@@ -53,7 +53,7 @@ def parameters_from_keys(hinge: HingeKeys) -> dict[str, float]:
     return parameter_values
 
 
-def initial_motion_axes(hinge: HingeKeys) -> list[tuple[Vector, Vector]] | None:
+def initial_motion_axes(hinge: HingeTable) -> list[tuple[Vector, Vector]] | None:
     """Translation and rotation of the outboard end per unit of each speed, in its own axes.
 
     The coordinates have their default initial values.  None where the type is not defined, or its
@@ -88,13 +88,13 @@ def _axes_matrix(z: Vector, x: Vector) -> Matrix:
     return ((x[0], y[0], z[0]), (x[1], y[1], z[1]), (x[2], y[2], z[2]))
 
 
-def _common_normal(hinge: HingeKeys) -> Vector:
+def _common_normal(hinge: HingeTable) -> Vector:
     normal = cross(hinge.unit_axis, _second_axis(hinge))
     length = norm(normal)
     return (normal[0] / length, normal[1] / length, normal[2] / length)
 
 
-def _second_axis(hinge: HingeKeys) -> Vector:
+def _second_axis(hinge: HingeTable) -> Vector:
     second_axis = hinge.unit_axis2
     assert second_axis is not None
     return second_axis

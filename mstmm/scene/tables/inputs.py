@@ -4,14 +4,10 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any
-
-from pydantic import model_validator
+from typing import Annotated, Any, NamedTuple
 
 from ...argument_validation import parse_number
 from ...expression.expression import Expression
@@ -19,8 +15,10 @@ from ...numerics.piecewise_polynomial import INTERPOLATIONS, PiecewisePolynomial
 from ..validators import constant_expressions
 from ..validators import names_and_text as texts
 from ..validators import scalars_and_vectors as rules
+from ..validators.names_and_text import SCENE_FOLDER
 from ..validators.scalars_and_vectors import (
     NAME_PATTERN,
+    Numbers,
     Rule,
     Table,
     ValidationProblems,
@@ -31,21 +29,11 @@ from ..validators.scalars_and_vectors import (
     require_finite,
     require_list,
     to_python,
+    unexpected,
 )
-from .elastic import SCENE_FOLDER
 
-
-def _unit_rule() -> Rule:
-    """Rule for a unit shown in tables and plots; nothing is converted."""
-    expected = 'a unit such as "N m"'
-
-    def check(value: Any) -> str:
-        checked_text = texts.require_text(value, expected)
-        if len(checked_text) > 64 or not checked_text.isprintable():
-            raise problem(f"expected {expected}, found {describe_value(checked_text)}")
-        return checked_text
-
-    return Rule(expected, check, {"type": "string", "maxLength": 64})
+#: A unit shown in tables and plots; nothing is converted.
+_Unit = Annotated[str, texts.label_rule('a unit such as "N m"', minimum=0)]
 
 
 def _value_rule() -> Rule:
@@ -70,15 +58,13 @@ class Input(Table):
     """
 
     name: Annotated[str, texts.name_rule("the input's name")]
-    unit: Annotated[str, _unit_rule()] = ""
+    unit: _Unit = ""
     value: Annotated[float | str, _value_rule()] = 0.0
     rates: Annotated[Numbers | None, rules.numbers_rule("two numbers: rate, second rate", 2)] = None
 
-    @model_validator(mode="after")
-    def _check(self) -> Input:
+    def _check(self) -> None:
         if self.rates is not None and isinstance(self.value, str):
             raise problem(f'the signal "{self.value}" has its own rates; leave them out', "rates")
-        return self
 
 
 class Output(Table):
@@ -89,20 +75,14 @@ class Output(Table):
 
     name: Annotated[str, texts.name_rule("the output's name")]
     of: Annotated[Expression, texts.formula_rule("a quantity of results or an expression of some")]
-    unit: Annotated[str, _unit_rule()] = ""
+    unit: _Unit = ""
 
 
-def _column_rule() -> Rule:
-    expected = "the name or the number of a column, 2 or more"
-
-    def check(value: Any) -> str | int:
-        if isinstance(value, str) and value:
-            return value
-        if isinstance(value, bool) or not isinstance(value, int) or value < 2:
-            raise problem(f"expected {expected}, found {describe_value(value)}")
-        return value
-
-    return Rule(expected, check, {"type": ["integer", "string"], "minimum": 2})
+_COLUMN = rules.value_rule(
+    "the name or the number of a column, 2 or more",
+    lambda value: value if isinstance(value, str) else rules.is_integer(value) and value >= 2,
+    {"type": ["integer", "string"], "minimum": 2},
+)
 
 
 class Signal(Table):
@@ -113,22 +93,20 @@ class Signal(Table):
     """
 
     name: Annotated[str, texts.name_rule("the signal's name")]
-    unit: Annotated[str, _unit_rule()] = ""
+    unit: _Unit = ""
     interpolation: Annotated[str, texts.choice_rule(*INTERPOLATIONS)] = "line"
     times: Annotated[Numbers, rules.numbers_rule("a list of times", of="s")] = ()
     values: Annotated[Numbers, rules.numbers_rule("a list of numbers")] = ()
     file: Annotated[str | None, texts.label_rule("a CSV file in the folder of the scene")] = None
-    column: Annotated[str | int | None, _column_rule()] = None
+    column: Annotated[str | int | None, _COLUMN] = None
 
-    @model_validator(mode="after")
-    def _load_samples(self) -> Signal:
+    def _check(self) -> None:
         if self.file is not None:
             self._read()
         elif self.column is not None:
             raise problem("only a signal from a file has a column; leave it out", "column")
         else:
             self._check_order([f"times[{k}]" for k in range(len(self.times))], "times")
-        return self
 
     def _read(self) -> None:
         """Replace the file name by the numbers of the file."""
@@ -138,13 +116,11 @@ class Signal(Table):
             columns = read_columns(str(self.file), SCENE_FOLDER.get(), self.column or 2)
         except ValidationProblems as refused:
             raise problem(str(refused), "file") from None
-        object.__setattr__(self, "times", columns.first)
-        object.__setattr__(self, "values", columns.other)
+        vars(self).update(times=columns.first, values=columns.other)
         self._check_order(
             [f"{describe_value(self.file)} row {line}" for line in columns.lines], "file"
         )
-        object.__setattr__(self, "file", None)
-        object.__setattr__(self, "column", None)
+        vars(self).update(file=None, column=None)
 
     def _check_order(self, rows: list[str], place: str) -> None:
         """Check that times ascend and rates are finite.  Raises Refused with the rows."""
@@ -181,7 +157,6 @@ class Signal(Table):
 # --- controllers ----------------------------------------------------------------------------------
 
 
-Numbers = tuple[float, ...]
 Matrix = tuple[Numbers, ...]
 
 
@@ -190,16 +165,14 @@ def _matrix_rule() -> Rule:
     expected = "a matrix: a list of rows of numbers of equal length"
 
     def row(value: Any, i: int) -> Numbers:
-        entries = require_list(to_python(value), "a row of numbers")
+        entries = require_list(value, "a row of numbers")
         return tuple(require_finite(to_python(x), "a number", i, k) for k, x in enumerate(entries))
 
     def check(value: Any) -> Matrix:
-        rows = check_entries(require_list(to_python(value), expected), expected, row)
-        if len({len(matrix_row) for matrix_row in rows}) > 1:
-            raise problem(
-                f"expected {expected}, found rows of {[len(matrix_row) for matrix_row in rows]} "
-                f"numbers"
-            )
+        rows = check_entries(require_list(value, expected), expected, row)
+        if len({len(numbers) for numbers in rows}) > 1:
+            widths = [len(numbers) for numbers in rows]
+            raise problem(f"expected {expected}, found rows of {widths} numbers")
         return rows
 
     item = {"type": "array", "items": {"type": ["number", "string"]}}
@@ -209,17 +182,16 @@ def _matrix_rule() -> Rule:
 def _names_rule(expected: str) -> Rule:
     def check_name(value: Any, i: int) -> str:
         if not isinstance(value, str) or not value:
-            raise problem(f"expected a name, found {describe_value(value)}", i)
+            raise unexpected("a name", value, i)
         return value
 
     def check(value: Any) -> tuple[str, ...]:
-        names = check_entries(require_list(to_python(value), expected), expected, check_name)
+        names = check_entries(require_list(value, expected), expected, check_name)
         if not names:
             raise problem(f"expected {expected}, found none")
         return names
 
-    items = {"type": "string"}
-    return Rule(expected, check, {"type": "array", "items": items, "minItems": 1})
+    return Rule(expected, check, {"type": "array", "items": {"type": "string"}, "minItems": 1})
 
 
 class Controller(Table):
@@ -241,8 +213,7 @@ class Controller(Table):
     reference: Annotated[Numbers, rules.numbers_rule("a list of numbers")] = ()
     offset: Annotated[Numbers, rules.numbers_rule("a list of numbers")] = ()
 
-    @model_validator(mode="after")
-    def _check(self) -> Controller:
+    def _check(self) -> None:
         n, n_y, n_u = len(self.A), len(self.inputs), len(self.outputs)
         for key, shape in (("A", (n, n)), ("B", (n, n_y)), ("C", (n_u, n)), ("D", (n_u, n_y))):
             rows = getattr(self, key)
@@ -263,7 +234,6 @@ class Controller(Table):
         for name in self.outputs:
             if self.outputs.count(name) > 1:
                 raise problem(f'"{name}" is listed twice; leave one out', "outputs")
-        return self
 
     @cached_property
     def complete_matrices(self) -> dict[str, Numbers]:
@@ -271,15 +241,10 @@ class Controller(Table):
         n, n_y, n_u = len(self.A), len(self.inputs), len(self.outputs)
         sizes = {"A": n * n, "B": n * n_y, "C": n_u * n, "D": n_u * n_y,
                  "initial": n, "reference": n_y, "offset": n_u}  # fmt: skip
-        return {key: tuple(_flatten(getattr(self, key))) or (0.0,) * sizes[key] for key in sizes}
-
-
-def _flatten(given: Any) -> Iterator[float]:
-    for row_or_number in given:
-        if isinstance(row_or_number, tuple):
-            yield from map(float, row_or_number)
-        else:
-            yield float(row_or_number)
+        rows = {key: getattr(self, key) for key in ("A", "B", "C", "D")}
+        given = {key: tuple(float(x) for row in rows[key] for x in row) for key in rows}
+        given |= {key: tuple(map(float, getattr(self, key))) for key in sizes if key not in rows}
+        return {key: given[key] or (0.0,) * size for key, size in sizes.items()}
 
 
 # --- CSV files in the folder of a scene -----------------------------------------------------------
@@ -289,12 +254,11 @@ def _flatten(given: Any) -> Iterator[float]:
 MAX_FILE_SIZE_MB = 64
 
 
-@dataclass(frozen=True)
-class Columns:
+class Columns(NamedTuple):
     """Two columns of a file: the first and another; `lines` are their line numbers."""
 
-    first: tuple[float, ...]
-    other: tuple[float, ...]
+    first: Numbers
+    other: Numbers
     lines: tuple[int, ...]
 
 
@@ -305,33 +269,29 @@ def read_columns(path: str, folder: str, column: str | int) -> Columns:
     semicolons or tabs.  The first line may contain their names; empty lines and those that begin
     with # are skipped.  Raises Refused.
     """
+    where = describe_value(path)
     rows = [
         (number, [cell.strip() for cell in line.split(_separator_of(line))])
         for number, line in enumerate(_read_text(path, folder).splitlines(), 1)
         if line.strip() and not line.lstrip().startswith("#")
     ]
     names = rows.pop(0)[1] if rows and _parse_number(rows[0][1][0]) is None else []
-    column_index = _column_index(path, column, names, len(rows[0][1]) if rows else 0)
+    index = _column_index(where, column, names, len(rows[0][1]) if rows else 0)
     if not rows:
-        raise problem(
-            f"{describe_value(path)}: expected rows of numbers, times in s first, found none"
-        )
-    first_column, second_column = list[float](), list[float]()
+        raise problem(f"{where}: expected rows of numbers, times in s first, found none")
+    numbers = []
     for line, cells in rows:
-        if len(cells) <= column_index:
+        if len(cells) <= index:
             raise problem(
-                f"{describe_value(path)}: row {line}: expected {column_index + 1} columns or "
-                f"more, found {len(cells)}"
+                f"{where}: row {line}: expected {index + 1} columns or more, found {len(cells)}"
             )
-        for cell, numbers in ((cells[0], first_column), (cells[column_index], second_column)):
+        for cell in (cells[0], cells[index]):
             value = _parse_number(cell)
             if value is None or not math.isfinite(value):
-                raise problem(
-                    f"{describe_value(path)}: row {line}: expected a number, found "
-                    f"{describe_value(cell)}"
-                )
+                found = describe_value(cell)
+                raise problem(f"{where}: row {line}: expected a number, found {found}")
             numbers.append(value)
-    return Columns(tuple(first_column), tuple(second_column), tuple(line for line, _ in rows))
+    return Columns(tuple(numbers[::2]), tuple(numbers[1::2]), tuple(line for line, _ in rows))
 
 
 def _separator_of(line: str) -> str:
@@ -345,41 +305,37 @@ def _parse_number(cell: str) -> float | None:
         return None
 
 
-def _column_index(path: str, column: str | int, names: list[str], width: int) -> int:
+def _column_index(where: str, column: str | int, names: list[str], width: int) -> int:
     if isinstance(column, str):
         if column not in names:
             available_names = ", ".join(names) or "none; give the column number instead"
-            raise problem(
-                f"{describe_value(path)}: no column {describe_value(column)}; its columns: "
-                f"{available_names}"
-            )
+            found = describe_value(column)
+            raise problem(f"{where}: no column {found}; its columns: {available_names}")
         return names.index(column)
     if width and column > width:
-        raise problem(f"{describe_value(path)}: no column {column}; it has {width} columns")
+        raise problem(f"{where}: no column {column}; it has {width} columns")
     return column - 1
 
 
 def _read_text(path: str, folder: str) -> str:
     """Text of a file in or below the folder."""
+    where = describe_value(path)
     folder_path = Path(folder or os.curdir).resolve()
     file_path = (folder_path / path).resolve()
     if Path(path).is_absolute() or not file_path.is_relative_to(folder_path):
         raise problem(
-            f"expected a file in the folder of the scene, found {describe_value(path)}; copy it "
+            f"expected a file in the folder of the scene, found {where}; copy it "
             "there, or give its numbers as times and values"
         )
     try:
         if not file_path.is_file():
-            raise problem(
-                f"{describe_value(path)}: there is no such file in the folder of the scene"
-            )
+            raise problem(f"{where}: there is no such file in the folder of the scene")
         if file_path.stat().st_size > MAX_FILE_SIZE_MB * 2**20:
             raise problem(
-                f"{describe_value(path)}: the file is larger than {MAX_FILE_SIZE_MB} MB; reduce "
-                f"its number of rows"
+                f"{where}: the file is larger than {MAX_FILE_SIZE_MB} MB; reduce its number of rows"
             )
         return file_path.read_text(encoding="utf-8-sig")
     except OSError as error:
-        raise problem(f"{describe_value(path)}: cannot be read: {error.strerror}") from None
+        raise problem(f"{where}: cannot be read: {error.strerror}") from None
     except UnicodeDecodeError:
-        raise problem(f"{describe_value(path)}: not UTF-8 text; save it as CSV in UTF-8") from None
+        raise problem(f"{where}: not UTF-8 text; save it as CSV in UTF-8") from None

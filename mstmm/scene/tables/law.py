@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated, Any, NamedTuple
 
-from pydantic import BaseModel, model_validator
+from pydantic import BaseModel
 
 from ...expression.expression import Expression, number
 from ..validators import names_and_text as texts
 from ..validators import scalars_and_vectors as rules
-from ..validators.scalars_and_vectors import Table
-
-Numbers = tuple[float, ...]
+from ..validators.scalars_and_vectors import Numbers, Table
 
 
 class Friction(Table):
@@ -30,16 +28,14 @@ class Friction(Table):
         """Whether there is any friction."""
         return self.static > 0
 
-    @model_validator(mode="after")
-    def _resolve_static_friction(self) -> Friction:
+    def _check(self) -> None:
         if self.static == 0:
-            object.__setattr__(self, "static", self.coulomb)
+            vars(self)["static"] = self.coulomb
         if self.static < self.coulomb:
             raise rules.problem(
                 f"static friction {self.static:g} is below coulomb friction {self.coulomb:g}; "
                 "leave it out, or increase it", "static",
             )  # fmt: skip
-        return self
 
 
 class Limits(Table):
@@ -65,36 +61,29 @@ class Limits(Table):
         """Whether there is a stop with a spring and a damper."""
         return self.acts and self.restitution is None
 
-    @model_validator(mode="after")
-    def _check(self) -> Limits:
-        if self.lower is not None and self.upper is not None and self.lower >= self.upper:
-            hint = "; swap them" if self.lower > self.upper else ""
-            message = f"lower ({self.lower:g}) must be below upper ({self.upper:g}){hint}"
-            raise rules.problem(message, "lower")
+    def _check(self) -> None:
+        check_range(self)
         if not self.acts and (self.stiffness > 0 or self.damping > 0 or self.restitution):
             raise rules.problem("limits need lower, upper or both", "lower")
-        return self if self.restitution is None else self._hard(self.restitution)
-
-    @model_validator(mode="after")
-    def _check_stop_stiffness(self) -> Limits:
+        if self.restitution is not None and self.restitution > 1:
+            raise rules.unexpected("at most 1 (no loss)", self.restitution, "restitution")
+        if self.restitution is not None and (self.stiffness > 0 or self.damping > 0):
+            raise rules.problem(
+                "expected restitution or stiffness for a stop, found both; give one", "restitution"
+            )
         if self.is_compliant and self.stiffness == 0:
             raise rules.problem(
                 "a stop needs a stiffness above 0 (N/m or N m/rad) or a restitution; "
                 "write for example stiffness = 1e5", "stiffness",
             )  # fmt: skip
-        return self
 
-    def _hard(self, restitution: float) -> Limits:
-        if restitution > 1:
-            raise rules.problem(
-                f"expected at most 1 (no loss), found {rules.describe_value(restitution)}",
-                "restitution",
-            )
-        if self.stiffness > 0 or self.damping > 0:
-            raise rules.problem(
-                "expected restitution or stiffness for a stop, found both; give one", "restitution"
-            )
-        return self
+
+def check_range(table: Any) -> None:
+    """Reject a key `lower` that is not below `upper`.  Raises ValidationProblems."""
+    lower, upper = table.lower, table.upper
+    if lower is not None and upper is not None and lower >= upper:
+        hint = "; swap them" if lower > upper else ""
+        raise rules.problem(f"lower ({lower:g}) must be below upper ({upper:g}){hint}", "lower")
 
 
 class LawEntry(NamedTuple):

@@ -5,13 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Annotated
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from ...expression.expression import Expression, number, parse
-from ...numerics.rotations import Vector
 from ..validators import names_and_text as texts
 from ..validators import scalars_and_vectors as rules
-from ..validators.scalars_and_vectors import GROUND, Table, describe_value, problem, split_reference
+from ..validators.names_and_text import check_two_ends
+from ..validators.scalars_and_vectors import (
+    Position,
+    Table,
+    describe_value,
+    problem,
+    split_reference,
+    unexpected,
+)
 from .chain import Hinges
 from .hinge import Hinge
 from .law import SpringLaw
@@ -52,14 +59,13 @@ class Load(Table):
     ] = None
     axes: Annotated[str, texts.body_rule('"inertial", "body" or the name of a body')] = "inertial"
 
-    @model_validator(mode="after")
-    def _check(self) -> Load:
+    def _check(self) -> None:
         if self.at is not None:
             self._check_mass_center()
         if self.force_per_length is None:
             if self.span is not None:
                 raise problem("only force_per_length acts on a span; leave it out", "span")
-            return self
+            return
         for key in ("force", "moment"):
             if not all(entry.is_zero for entry in getattr(self, key)):
                 raise problem(
@@ -73,11 +79,7 @@ class Load(Table):
                 "on",
             )
         if self.span is not None and not 0 <= self.span[0] < self.span[1]:
-            raise problem(
-                f"expected [from, to] in m with 0 <= from < to, found {describe_value(self.span)}",
-                "span",
-            )
-        return self
+            raise unexpected("[from, to] in m with 0 <= from < to", self.span, "span")
 
     def _check_mass_center(self) -> None:
         """Reject a load at the mass centre with an end or a force per length.  Raises Refused."""
@@ -105,23 +107,18 @@ class Event(Table):
     hinge: Annotated[str | None, texts.name_rule("the hinge to release")] = None
     restitution: Annotated[float | None, rules.number_rule(above=0.0)] = None
 
-    @model_validator(mode="after")
-    def _check(self) -> Event:
+    def _check(self) -> None:
         if (self.do == "bounce") != (self.restitution is not None):
             raise problem(
                 'missing; do = "bounce" needs a number above 0, at most 1' if self.do == "bounce"
                 else 'only do = "bounce" has a restitution; leave it out', "restitution",
             )  # fmt: skip
         if self.restitution is not None and self.restitution > 1:
-            raise problem(
-                f"expected at most 1 (no loss), found {describe_value(self.restitution)}",
-                "restitution",
-            )
+            raise unexpected("at most 1 (no loss)", self.restitution, "restitution")
         if self.do == "release" and self.hinge is None:
             raise problem('missing; do = "release" needs the name of a hinge', "hinge")
         if self.do != "release" and self.hinge is not None:
             raise problem('only do = "release" has a hinge; leave it out', "hinge")
-        return self
 
 
 def stop_events(hinges: Hinges) -> tuple[Event, ...]:
@@ -169,27 +166,17 @@ class Spring(Table):
 
     name: Annotated[str, texts.name_rule("the spring's name")] = ""
     type: Annotated[str, texts.name_rule("a force element type")] = "spring"
-    from_: Annotated[str, texts.end_rule()] = Field(alias="from")
-    to: Annotated[str, texts.end_rule()]
-    position: Annotated[Vector, rules.vector_rule("m")] = (0.0, 0.0, 0.0)
+    from_: texts.Reference = Field(alias="from")
+    to: texts.Reference
+    position: Position = (0.0, 0.0, 0.0)
     law: SpringLaw = SpringLaw()
-    parameters: Annotated[dict[str, float], texts.parameters_rule()] = Field(default_factory=dict)
+    parameters: texts.Parameters = Field(default_factory=dict)
 
-    @model_validator(mode="after")
-    def _check(self) -> Spring:
-        bodies = (split_reference(self.from_)[0], split_reference(self.to)[0])
-        if bodies[0] == bodies[1]:
-            raise problem(
-                f'both ends are on "{bodies[0]}", so it has no effect; connect two bodies', "to"
-            )
-        if GROUND not in bodies and self.position != (0.0, 0.0, 0.0):
-            raise problem(
-                "only a spring on the ground has a position; define an end of the body there",
-                "position",
-            )
+    def _check(self) -> None:
+        check_two_ends(self, "a spring", ", so it has no effect")
         if self.type == "spring" and self.parameters:
-            raise problem("a spring has no parameters; set type to your user-defined type",
-                         "parameters")  # fmt: skip
+            raise problem(
+                "a spring has no parameters; set type to your user-defined type", "parameters"
+            )
         if self.type != "spring" and self.law != SpringLaw():
             raise problem('law belongs to type "spring"; use parameters', "law")
-        return self

@@ -8,12 +8,12 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from ..validators.scalars_and_vectors import (
-    Location,
+    Problem,
     Rule,
     Table,
     ValidationProblems,
     describe_value,
-    problem,
+    unexpected,
 )
 
 #: Most characters of a name in other programs.
@@ -21,11 +21,13 @@ MAX_NAME_LENGTH = 200
 
 
 def is_external_name(name: object) -> bool:
-    """Whether text is a valid name in other programs: printable, not blank, at most
-    `MAX_NAME_LENGTH`."""
-    if not isinstance(name, str) or len(name) > MAX_NAME_LENGTH:
-        return False
-    return name.isprintable() and bool(name.strip())
+    """Whether text is a valid name in other programs: printable, not blank, not too long."""
+    return (
+        isinstance(name, str)
+        and len(name) <= MAX_NAME_LENGTH
+        and name.isprintable()
+        and bool(name.strip())
+    )
 
 
 def _names_rule(of: str, example: str) -> Rule:
@@ -33,19 +35,15 @@ def _names_rule(of: str, example: str) -> Rule:
 
     def check(value: Any) -> dict[str, str]:
         if not isinstance(value, dict):
-            raise problem(f"expected {expected}, found {describe_value(value)}")
-        problems = list[tuple[Location, str]]()
+            raise unexpected(expected, value)
+        characters = f"printable names of 1 to {MAX_NAME_LENGTH} characters, not only blanks"
+        problems = list[Problem]()
         for name, scene_name in value.items():
             if not is_external_name(name):
-                message = (
-                    f"expected printable names of 1 to {MAX_NAME_LENGTH} characters, not "
-                    f"only blanks"
-                )
-                problems.append(((str(name),), message))
+                problems.append(((str(name),), f"expected {characters}"))
             elif not isinstance(scene_name, str):
-                problems.append(
-                    ((name,), f"expected a name of the scene, found {describe_value(scene_name)}")
-                )
+                text = f"expected a name of the scene, found {describe_value(scene_name)}"
+                problems.append(((name,), text))
         if problems:
             raise ValidationProblems(*problems)
         return dict(value)
@@ -87,16 +85,9 @@ class Names(Table):
 
     def among(self, references: Container[str], hinges: Container[str]) -> Names:
         """Subset of the names whose bodies, ends and hinges exist."""
-        return Names.model_construct(
-            body={
-                name: scene_name
-                for name, scene_name in self.body.items()
-                if scene_name in references
-            },
-            hinge={
-                name: scene_name for name, scene_name in self.hinge.items() if scene_name in hinges
-            },
-        )
+        body = {name: other for name, other in self.body.items() if other in references}
+        hinge = {name: other for name, other in self.hinge.items() if other in hinges}
+        return Names.model_construct(body=body, hinge=hinge)
 
 
 def _replace_known_prefix(name: str, known: Mapping[str, str]) -> str:

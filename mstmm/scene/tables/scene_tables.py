@@ -22,9 +22,9 @@ from ..validators.scalars_and_vectors import (
     Table,
     ValidationProblems,
     describe_value,
-    problem,
     require_finite,
     to_python,
+    unexpected,
 )
 from .beam import Beam
 from .body import Body, End
@@ -58,7 +58,7 @@ def evaluate_constants(value: Any) -> dict[str, float]:
     """
     expected = "a table of named numbers"
     if not isinstance(value, dict):
-        raise problem(f"expected {expected}, found {describe_value(value)}")
+        raise unexpected(expected, value)
     constants_by_name: dict[str, float] = {}
     problems: list[tuple[Location, str]] = []
     for name, given_value in value.items():
@@ -80,11 +80,8 @@ def evaluate_constants(value: Any) -> dict[str, float]:
 def constants_rule() -> Rule:
     """Rule for the table [constants]."""
     item = {"type": ["number", "string"]}
-    return Rule(
-        "a table of named numbers",
-        evaluate_constants,
-        {"type": "object", "additionalProperties": item},
-    )
+    schema = {"type": "object", "additionalProperties": item}
+    return Rule("a table of named numbers", evaluate_constants, schema)
 
 
 # --- rigid equivalents of flexible bodies ---------------------------------------------------------
@@ -94,51 +91,24 @@ def rigid_body_of_beam(beam: Beam) -> Body:
     """Rigid body of an undeformed beam: mass, mass centre, inertia and ends."""
     mass = first_moment = second_moment = polar_sum = 0.0
     rotary_sums = [0.0, 0.0]
-    for beam_section in beam.sections:
-        mass_per_length, section_length = (
-            beam_section.mass_per_length or 0.0,
-            beam_section.to - beam_section.from_,
-        )
-        mass += mass_per_length * section_length
-        first_moment += (
-            mass_per_length * section_length * (beam_section.to + beam_section.from_) / 2
-        )
-        second_moment += (
-            mass_per_length
-            * section_length
-            * (
-                beam_section.to * beam_section.to
-                + beam_section.to * beam_section.from_
-                + beam_section.from_ * beam_section.from_
-            )
-            / 3
-        )
-        polar_moment = (beam_section.polar_inertia_per_length or 0.0) * section_length
+    for section in beam.sections:
+        start, end = section.from_, section.to
+        mass_per_length, length = section.mass_per_length or 0.0, end - start
+        mass += mass_per_length * length
+        first_moment += mass_per_length * length * (end + start) / 2
+        second_moment += mass_per_length * length * (end * end + end * start + start * start) / 3
+        polar_moment = (section.polar_inertia_per_length or 0.0) * length
         polar_sum += polar_moment
-        rotary_inertia = beam_section.rotary_inertia
-        rotary_sums[0] += (
-            polar_moment / 2 if rotary_inertia is None else rotary_inertia[0] * section_length
-        )
-        rotary_sums[1] += (
-            polar_moment / 2 if rotary_inertia is None else rotary_inertia[1] * section_length
-        )
+        for k in range(2):
+            rotary = section.rotary_inertia
+            rotary_sums[k] += polar_moment / 2 if rotary is None else rotary[k] * length
     centre = first_moment / mass
-    transverse_moment = second_moment - first_moment * centre
+    transverse = second_moment - first_moment * centre
+    moments = (polar_sum, transverse + rotary_sums[0], transverse + rotary_sums[1])
     return Body.model_construct(
-        name=beam.name,
-        type="rigid",
-        mass=mass,
-        center_of_mass=(centre, 0.0, 0.0),
-        inertia=(
-            polar_sum,
-            transverse_moment + rotary_sums[0],
-            transverse_moment + rotary_sums[1],
-            0.0,
-            0.0,
-            0.0,
-        ),
-        ends=beam.ends,
-    )
+        name=beam.name, type="rigid", mass=mass, center_of_mass=(centre, 0.0, 0.0),
+        inertia=(*moments, 0.0, 0.0, 0.0), ends=beam.ends,
+    )  # fmt: skip
 
 
 def massless_body(flexible: Beam | Elastic) -> Body:
@@ -156,7 +126,7 @@ def massless_body(flexible: Beam | Elastic) -> Body:
 
 def _check_version(value: Any) -> int:
     if isinstance(value, bool) or not isinstance(value, int) or value != 1:
-        raise rules.problem(f"expected 1, the only version, found {rules.describe_value(value)}")
+        raise unexpected("1, the only version", value)
     return value
 
 
@@ -165,7 +135,7 @@ class SceneTables(Table):
 
     schema_version: Annotated[int, rules.Rule("1", _check_version, {"const": 1})] = 1
     gravity: Annotated[Vector, rules.vector_rule("m/s^2, such as [0, -9.81, 0]")]
-    allow_unphysical_inertia: Annotated[bool, texts.flag_rule()] = False
+    allow_unphysical_inertia: texts.Flag = False
     constants: Annotated[dict[str, float], constants_rule()] = Field(default_factory=dict)
     input: tuple[Input, ...] = ()
     signal: tuple[Signal, ...] = ()
@@ -225,11 +195,7 @@ class SceneTables(Table):
     @property
     def controllers_by_input(self) -> dict[str, str]:
         """Names of controllers by the inputs that they set."""
-        return {
-            name: controller_table.name
-            for controller_table in self.controller
-            for name in controller_table.outputs
-        }
+        return {name: element.name for element in self.controller for name in element.outputs}
 
     def with_inputs(self, values: Mapping[str, float | str]) -> Self:
         """Copy of the scene with other input values: numbers, or names of signals of the scene.
@@ -237,9 +203,9 @@ class SceneTables(Table):
         Nothing is validated: the values must be permitted, and no drive may depend on the inputs.
         """
         inputs = tuple(
-            input_table.model_copy(update={"value": values[input_table.name], "rates": None})
-            if input_table.name in values else input_table
-            for input_table in self.input
+            one.model_copy(update={"value": values[one.name], "rates": None})
+            if one.name in values else one
+            for one in self.input
         )  # fmt: skip
         copy = self.model_copy(update={"input": inputs})
         for cached_name in ("channels", "_skeleton"):

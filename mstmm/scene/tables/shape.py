@@ -4,26 +4,20 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from typing import Annotated, Any
-
-from pydantic import model_validator
+from typing import Annotated
 
 from ...numerics.rotations import Matrix, Vector, from_orientation
 from ..validators import names_and_text as texts
-from ..validators import rotations_and_inertia
 from ..validators import scalars_and_vectors as rules
+from ..validators.rotations_and_inertia import Orientation
 from ..validators.scalars_and_vectors import (
     GROUND,
-    Location,
-    Orientation,
-    Rule,
+    Position,
+    Problem,
     Table,
-    ValidationProblems,
     describe_value,
-    problem,
     split_reference,
 )
-from .elastic import path_inside_rule
 
 #: Keys of each type.
 _KEYS_BY_TYPE = {
@@ -34,18 +28,7 @@ _KEY_DESCRIPTIONS = {
     "size": "[x, y, z] in m", "radius": "a number in m", "length": "a number in m",
     "file": "an .stl or .obj file in the folder of the scene",
 }  # fmt: skip
-_COLOUR = re.compile("#[0-9a-fA-F]{6}")
-
-
-def _colour_rule() -> Rule:
-    expected = 'a colour such as "#4477aa"'
-
-    def check(value: Any) -> str:
-        if not isinstance(value, str) or not _COLOUR.fullmatch(value):
-            raise problem(f"expected {expected}, found {describe_value(value)}")
-        return value.lower()
-
-    return Rule(expected, check, {"type": "string", "pattern": f"^{_COLOUR.pattern}$"})
+_COLOUR = texts.pattern_rule('a colour such as "#4477aa"', re.compile("#[0-9a-fA-F]{6}"), str.lower)
 
 
 class Shape(Table):
@@ -57,26 +40,19 @@ class Shape(Table):
     """
 
     name: Annotated[str, texts.name_rule("the shape's name")] = ""
-    on: Annotated[str, texts.end_rule()]
+    on: texts.Reference
     type: Annotated[str, texts.choice_rule(*_KEYS_BY_TYPE)]
     size: Annotated[Vector | None, rules.vector_rule("m")] = None
     radius: Annotated[float | None, rules.number_rule("m", above=0)] = None
     length: Annotated[float | None, rules.number_rule("m", above=0)] = None
-    file: Annotated[str | None, path_inside_rule(".stl", ".obj")] = None
+    file: Annotated[str | None, texts.path_inside_rule(".stl", ".obj")] = None
     scale: Annotated[float | None, rules.number_rule("m per unit of the mesh", above=0)] = None
-    position: Annotated[Vector, rules.vector_rule("m")] = (0.0, 0.0, 0.0)
-    orientation: Annotated[Orientation, rotations_and_inertia.orientation_rule()] = (0.0, 0.0, 0.0)
-    color: Annotated[str | None, _colour_rule()] = None
+    position: Position = (0.0, 0.0, 0.0)
+    orientation: Orientation = (0.0, 0.0, 0.0)
+    color: Annotated[str | None, _COLOUR] = None
     opacity: Annotated[float, rules.number_rule("0 to 1", above=0)] = 1.0
 
-    @model_validator(mode="after")
-    def _check(self) -> Shape:
-        problems = list(self._problems())
-        if problems:
-            raise ValidationProblems(*problems)
-        return self
-
-    def _problems(self) -> Iterator[tuple[Location, str]]:
+    def _problems(self) -> Iterator[Problem]:
         required_keys = _KEYS_BY_TYPE[self.type]
         for key, description in _KEY_DESCRIPTIONS.items():
             is_given = getattr(self, key) is not None

@@ -1,10 +1,13 @@
-"""Rules for text values: names, references, choices and expressions."""
+"""Rules for text values: names, references, choices, paths and expressions."""
 
 from __future__ import annotations
 
+import os
 import re
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from contextvars import ContextVar
+from pathlib import Path
+from typing import Annotated, Any
 
 from ...errors import ExpressionError
 from ...expression.expression import Expression, number
@@ -16,14 +19,43 @@ from .scalars_and_vectors import (
     NAME_DESCRIPTION,
     NAME_PATTERN,
     Rule,
+    Shorthand,
     check_entries,
     count_text,
     describe_value,
     problem,
     require_finite,
     require_list,
+    split_reference,
     to_python,
+    unexpected,
+    value_rule,
 )
+
+#: Folder from which relative paths start while a scene file is read; "" leaves paths unchanged.
+SCENE_FOLDER: ContextVar[str] = ContextVar("folder", default="")
+
+
+def text_rule(
+    expected: str,
+    accepts: Callable[[str], object],
+    schema: dict[str, Any],
+    convert: Callable[[str], str] = str,
+) -> Rule:
+    """Rule for the texts for which `accepts` is true."""
+    return value_rule(
+        expected,
+        lambda value: isinstance(value, str) and accepts(value),
+        {"type": "string", **schema},
+        convert,
+    )
+
+
+def pattern_rule(
+    expected: str, pattern: re.Pattern[str], convert: Callable[[str], str] = str
+) -> Rule:
+    """Rule for the texts of a pattern."""
+    return text_rule(expected, pattern.fullmatch, {"pattern": f"^{pattern.pattern}$"}, convert)
 
 
 def name_rule(expected: str, missing: str = "") -> Rule:
@@ -32,100 +64,131 @@ def name_rule(expected: str, missing: str = "") -> Rule:
     `missing` describes the expected value where the name is left out.
     """
 
-    def check(value: Any) -> str:
-        checked_text = require_text(value, f"{expected}: {NAME_DESCRIPTION}")
-        if not NAME_PATTERN.fullmatch(checked_text):
-            raise problem(
-                f"expected {expected}: {NAME_DESCRIPTION}, found {describe_value(checked_text)}"
-            )
-        if checked_text == GROUND:
+    def convert(text: str) -> str:
+        if text == GROUND:
             raise problem('"ground" is reserved for the inertial frame; choose another name')
-        return checked_text
+        return str(text)
 
-    return Rule(
-        f"{expected}: {missing or NAME_DESCRIPTION}",
-        check,
-        {"type": "string", "pattern": _pattern(NAME_PATTERN)},
-    )
-
-
-def _pattern(expression: re.Pattern[str]) -> str:
-    return f"^{expression.pattern}$"
-
-
-def require_text(value: Any, expected: str) -> str:
-    """Require text.  Raises Refused."""
-    if not isinstance(value, str):
-        raise problem(f"expected {expected}, found {describe_value(value)}")
-    return str(value)
+    rule = pattern_rule(f"{expected}: {NAME_DESCRIPTION}", NAME_PATTERN, convert)
+    return Rule(f"{expected}: {missing or NAME_DESCRIPTION}", rule.check, rule.schema)
 
 
 def end_rule(ground: bool = True) -> Rule:
     """Rule for a reference to a body ("rod1": its origin), an end ("rod1.tip") or the ground."""
     expected = 'a body or an end of one ("rod1" or "rod1.tip")' + (' or "ground"' if ground else "")
-    shape = re.compile(rf"{BODY_PATTERN.pattern}(\.{NAME_PATTERN.pattern})?")
 
-    def check(value: Any) -> str:
-        checked_text = require_text(value, expected)
-        if not shape.fullmatch(checked_text):
-            raise problem(f"expected {expected}, found {describe_value(checked_text)}")
-        if checked_text.startswith(f"{GROUND}."):
-            raise problem(
-                f'expected "ground", which has no ends, found {describe_value(checked_text)}'
-            )
-        if checked_text == GROUND and not ground:
+    def convert(text: str) -> str:
+        if text.startswith(f"{GROUND}."):
+            raise unexpected('"ground", which has no ends', text)
+        if text == GROUND and not ground:
             raise problem(f"expected {expected}, found 'ground', which does not move")
-        return checked_text
+        return str(text)
 
-    return Rule(expected, check, {"type": "string", "pattern": _pattern(shape)})
+    pattern = re.compile(rf"{BODY_PATTERN.pattern}(\.{NAME_PATTERN.pattern})?")
+    return pattern_rule(expected, pattern, convert)
 
 
 def body_rule(expected: str) -> Rule:
     """Rule for the spelling of a body's name: "rod1", or "rope[3]" of a chain; not "ground"."""
-
-    def check(value: Any) -> str:
-        checked_text = require_text(value, expected)
-        if not BODY_PATTERN.fullmatch(checked_text) or checked_text == GROUND:
-            raise problem(f"expected {expected}, found {describe_value(checked_text)}")
-        return checked_text
-
-    return Rule(expected, check, {"type": "string", "pattern": _pattern(BODY_PATTERN)})
+    return text_rule(
+        expected,
+        lambda text: BODY_PATTERN.fullmatch(text) and text != GROUND,
+        {"pattern": f"^{BODY_PATTERN.pattern}$"},
+    )
 
 
-def label_rule(expected: str) -> Rule:
-    """Rule for a name given by another program: 1 to 64 printable characters."""
-
-    def check(value: Any) -> str:
-        checked_text = require_text(value, expected)
-        if not 0 < len(checked_text) <= 64 or not checked_text.isprintable():
-            raise problem(f"expected {expected}, found {describe_value(checked_text)}")
-        return checked_text
-
-    return Rule(expected, check, {"type": "string", "minLength": 1, "maxLength": 64})
+def label_rule(expected: str, minimum: int = 1) -> Rule:
+    """Rule for text that another program reads or writes: `minimum` to 64 printable characters."""
+    return text_rule(
+        expected,
+        lambda text: minimum <= len(text) <= 64 and text.isprintable(),
+        ({"minLength": minimum} if minimum else {}) | {"maxLength": 64},
+    )
 
 
 def choice_rule(*options: str) -> Rule:
     """Rule for one of several keywords."""
     expected = " or ".join(f'"{option}"' for option in options)
-
-    def check(value: Any) -> str:
-        if not isinstance(value, str) or value not in options:
-            raise problem(f"expected {expected}, found {describe_value(value)}")
-        return str(value)
-
-    return Rule(expected, check, {"enum": list(options)})
+    rule = text_rule(expected, options.__contains__, {})
+    return Rule(expected, rule.check, {"enum": list(options)})
 
 
 def flag_rule() -> Rule:
     """Rule for true or false."""
+    return value_rule("true or false", lambda value: isinstance(value, bool), {"type": "boolean"})
 
-    def check(value: Any) -> bool:
-        value = to_python(value)
-        if not isinstance(value, bool):
-            raise problem(f"expected true or false, found {describe_value(value)}")
-        return value
 
-    return Rule("true or false", check, {"type": "boolean"})
+def path_rule(*suffixes: str) -> Rule:
+    """Rule for the path of a file, relative to the folder of the scene file."""
+    suffix_text = " or ".join(suffixes)
+    expected = "the path of a file" + (f" ending in {suffix_text}" if suffixes else "")
+    rule = text_rule(
+        expected,
+        lambda text: text and text.isprintable() and text.lower().endswith(suffixes or ""),
+        {},
+        lambda text: str(Path(SCENE_FOLDER.get()) / text) if SCENE_FOLDER.get() else text,
+    )
+
+    def check(value: Any) -> Any:
+        return rule.check(os.fspath(value) if isinstance(value, os.PathLike) else value)
+
+    return Rule(expected, check, rule.schema)
+
+
+def path_inside_rule(*suffixes: str) -> Rule:
+    """Rule for the path of a regular file in the folder of the scene file, or below.
+
+    For a scene that was not read from a file, any path is accepted.
+    """
+    any_path_rule = path_rule(*suffixes)
+
+    def check(value: Any) -> str:
+        name: str = any_path_rule.check(value)
+        if not SCENE_FOLDER.get():
+            return name
+        scene_folder, location = Path(SCENE_FOLDER.get()).resolve(), Path(name).resolve()
+        if not location.is_relative_to(scene_folder):
+            raise problem(
+                f"expected a file in the folder of the scene, found {describe_value(value)}; copy "
+                f"it there"
+            )
+        if not location.is_file():
+            raise problem(
+                f"{describe_value(value)}: there is no such file in the folder of the scene"
+            )
+        return name
+
+    return Rule(any_path_rule.expected, check, any_path_rule.schema)
+
+
+def ends_rule(
+    expected: str, table: str, schema: dict[str, Any], widen: Callable[[Any], Any]
+) -> Shorthand:
+    """Rule for ends by name, each converted by `widen`; `table` is what the whole has to be."""
+
+    def widen_all(value: Any) -> Any:
+        if not isinstance(value, dict):
+            raise unexpected(table, value)
+        for key in value:
+            if not isinstance(key, str) or not NAME_PATTERN.fullmatch(key):
+                raise unexpected("the name of an end", key)
+        return {key: widen(end) for key, end in value.items()}
+
+    return Shorthand(expected, widen_all, {"type": "object", **schema})
+
+
+def check_two_ends(element: Any, what: str, effect: str = "") -> None:
+    """Reject ends `from` and `to` on one body, and a position where none is on the ground.
+
+    Raises ValidationProblems.
+    """
+    bodies = (split_reference(element.from_)[0], split_reference(element.to)[0])
+    if bodies[0] == bodies[1]:
+        raise problem(f'both ends are on "{bodies[0]}"{effect}; connect two bodies', "to")
+    if GROUND not in bodies and element.position != (0.0, 0.0, 0.0):
+        raise problem(
+            f"only {what} on the ground has a position; define an end of the body there", "position"
+        )
 
 
 def parameters_rule() -> Rule:
@@ -134,10 +197,10 @@ def parameters_rule() -> Rule:
 
     def check(value: Any) -> dict[str, float]:
         if not isinstance(value, dict):
-            raise problem(f"expected {expected}, found {describe_value(value)}")
+            raise unexpected(expected, value)
         for key in value:
             if not isinstance(key, str) or not NAME_PATTERN.fullmatch(key):
-                raise problem(f"expected names ({NAME_DESCRIPTION}), found {describe_value(key)}")
+                raise unexpected(f"names ({NAME_DESCRIPTION})", key)
 
         def check_value(key: Any, _: int) -> float:
             return require_finite(to_python(value[key]), "a number", key)
@@ -240,7 +303,7 @@ def formula_rule(expected: str) -> Rule:
     def check(value: Any) -> Expression:
         value = to_python(value)
         if not isinstance(value, (str, Expression)):
-            raise problem(f"expected {expected}, found {describe_value(value)}")
+            raise unexpected(expected, value)
         result = to_expression(value, expected)
         if result.is_constant:
             raise problem(
@@ -265,7 +328,7 @@ def condition_rule(expected: str, time: bool = False) -> Rule:
                 f"t >= {require_finite(value, expected)!r}"
             )
         if not isinstance(value, (str, Expression)):
-            raise problem(f"expected {expected}, found {describe_value(value)}")
+            raise unexpected(expected, value)
         result = to_expression(value, expected)
         if not result.is_condition:
             raise problem(
@@ -275,3 +338,9 @@ def condition_rule(expected: str, time: bool = False) -> Rule:
 
     schema = {"type": ["string", "number"] if time else "string"}
     return Rule(expected, check, schema, _expression_text)
+
+
+#: Values of keys of several tables: true or false, a body or end, parameters of user-defined types.
+Flag = Annotated[bool, flag_rule()]
+Reference = Annotated[str, end_rule()]
+Parameters = Annotated[dict[str, float], parameters_rule()]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Annotated, Any
 
 from ...numerics.rotations import (
     Matrix,
@@ -56,6 +56,10 @@ def orientation_rule() -> Rule:
         return unit_quaternion(result, expected) if len(result) == 4 else result
 
     return Rule(expected, check, {"anyOf": [*inner.schema["anyOf"], _ROWS]})
+
+
+#: Value of the key `orientation` of several tables.
+Orientation = Annotated[Numbers, orientation_rule()]
 
 
 def unit_quaternion(q: tuple[float, ...], expected: str, *place: str | int) -> tuple[float, ...]:

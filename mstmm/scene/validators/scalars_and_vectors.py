@@ -9,16 +9,22 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, get_args
+from typing import Annotated, Any, Self, get_args
 
-from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    model_validator,
+)
 from pydantic.json_schema import GenerateJsonSchema
 from pydantic_core import CoreSchema, core_schema
 
 from ...errors import ExpressionError
-from ...numerics.rotations import norm
+from ...numerics.rotations import Vector, norm
 from . import constant_expressions
 from .constant_expressions import unit_hint, unit_remedy
 
@@ -29,14 +35,15 @@ NAME_DESCRIPTION = "a letter, then letters, digits or _ (64 characters at most)"
 GROUND = "ground"
 
 Location = tuple[str | int, ...]
+#: Location inside a value, and message.
+Problem = tuple[Location, str]
 Numbers = tuple[float, ...]
-Orientation = tuple[float, ...]
 
 
 class ValidationProblems(ValueError):
     """Problems of a value, each as (location inside the value, message)."""
 
-    def __init__(self, *problems: tuple[Location, str]) -> None:
+    def __init__(self, *problems: Problem) -> None:
         super().__init__("; ".join(message for _, message in problems))
         self.problems = problems
 
@@ -44,6 +51,11 @@ class ValidationProblems(ValueError):
 def problem(message: str, *place: str | int) -> ValidationProblems:
     """Exception with a single problem at `place` inside the value, for the caller to raise."""
     return ValidationProblems((place, message))
+
+
+def unexpected(expected: str, value: object, *place: str | int) -> ValidationProblems:
+    """Exception for a value that is not the expected one, for the caller to raise."""
+    return problem(f"expected {expected}, found {describe_value(value)}", *place)
 
 
 def describe_value(value: object, depth: int = 0) -> str:
@@ -81,9 +93,26 @@ class _JsonSchemaGenerator(GenerateJsonSchema):
 
 
 class Table(BaseModel):
-    """Base of all tables of a scene: frozen; unknown keys are rejected."""
+    """Base of all tables of a scene: frozen; unknown keys are rejected.
+
+    A table has rules for its keys among each other in `_check` and `_problems`.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
+
+    def _check(self) -> None:
+        """Complete the values, and raise ValidationProblems where they contradict each other."""
+
+    def _problems(self) -> Iterable[Problem]:
+        """Problems of the values with each other, all of which are reported."""
+        return ()
+
+    @model_validator(mode="after")
+    def _apply_rules(self) -> Self:
+        self._check()
+        if problems := tuple(self._problems()):
+            raise ValidationProblems(*problems)
+        return self
 
     @classmethod
     def model_json_schema(cls, *args: Any, **options: Any) -> dict[str, Any]:
@@ -148,6 +177,23 @@ class Shorthand:
         return {"description": self.expected, "anyOf": [inner, self.schema]}
 
 
+def value_rule(
+    expected: str,
+    accepts: Callable[[Any], object],
+    schema: dict[str, Any],
+    convert: Callable[[Any], Any] = lambda value: value,
+) -> Rule:
+    """Rule for the values for which `accepts` is true; `convert` normalises them."""
+
+    def check(value: Any) -> Any:
+        value = to_python(value)
+        if not accepts(value):
+            raise unexpected(expected, value)
+        return convert(value)
+
+    return Rule(expected, check, schema)
+
+
 # --- numbers ---------------------------------------------------------------------------------
 
 
@@ -161,7 +207,7 @@ def require_finite(value: Any, expected: str, *place: str | int) -> float:
     if isinstance(value, str):
         return _number_from_text(value, expected, *place)
     if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise problem(f"expected {expected}, found {describe_value(value)}", *place)
+        raise unexpected(expected, value, *place)
     if isinstance(value, constant_expressions.WrittenNumber):
         return value
     try:
@@ -222,33 +268,32 @@ def number_rule(of: str = "", minimum: float | None = None, above: float | None 
     return Rule(expected, check, schema)
 
 
+def is_integer(value: Any) -> bool:
+    """Whether a value is a whole number; true and false are none."""
+    return isinstance(value, int) and not isinstance(value, bool)
+
+
 def integer(minimum: int, maximum: int) -> Rule:
     """Rule for a whole number from `minimum` to `maximum`, both included."""
-    expected = f"a whole number from {minimum} to {maximum}"
-
-    def check(value: Any) -> int:
-        value = to_python(value)
-        if isinstance(value, bool) or not isinstance(value, int):
-            raise problem(f"expected {expected}, found {describe_value(value)}")
-        if not minimum <= value <= maximum:
-            raise problem(f"expected {expected}, found {describe_value(value)}")
-        return value
-
-    return Rule(expected, check, {"type": "integer", "minimum": minimum, "maximum": maximum})
+    return value_rule(
+        f"a whole number from {minimum} to {maximum}",
+        lambda value: is_integer(value) and minimum <= value <= maximum,
+        {"type": "integer", "minimum": minimum, "maximum": maximum},
+    )
 
 
 def _check_bounds(
     value: float, expected: str, minimum: float | None, above: float | None, *place: str | int
 ) -> None:
     if (minimum is not None and value < minimum) or (above is not None and value <= above):
-        raise problem(f"expected {expected}, found {describe_value(value)}", *place)
+        raise unexpected(expected, value, *place)
 
 
 def require_list(value: Any, expected: str) -> Sequence[Any]:
     """Require a list and return its entries.  Raises Refused."""
     value = to_python(value)
     if not isinstance(value, (list, tuple)):
-        raise problem(f"expected {expected}, found {describe_value(value)}")
+        raise unexpected(expected, value)
     return value
 
 
@@ -340,3 +385,8 @@ def direction_rule() -> Rule:
         return result
 
     return Rule(expected, check, inner.schema)
+
+
+#: Values of keys of several tables: a point (m) and a direction.
+Position = Annotated[Vector, vector_rule("m")]
+Direction = Annotated[Vector, direction_rule()]
