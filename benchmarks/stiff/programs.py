@@ -125,7 +125,7 @@ class Equations:
     """mstmm's equations and their exact Jacobian for external integrators."""
 
     def __init__(self, model: mstmm.Model, case: Case) -> None:
-        from mstmm.runtime.run.external_integrators import Equations as Calls
+        from mstmm.runtime.run.event_location import Equations as Calls
 
         self.model, self.case, self.calls = model, case, Calls(model)
         self.start = self.calls.scene.start(0.0, *model.initial_state())

@@ -109,8 +109,7 @@ def _sweep_section() -> Section:
 
 def _method_section() -> Section:
     from mstmm.runtime.integrate.steppers import AUTO, AUTO_EXPLICIT, get, names
-    from mstmm.runtime.run import classical_run
-    from mstmm.runtime.run.external_integrators import sundials
+    from mstmm.runtime.run import classical_run, sundials
 
     rows, data = [], []
     for name in names():

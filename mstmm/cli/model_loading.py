@@ -67,8 +67,7 @@ def load_method(name: str) -> None:
 
     SceneError for an unknown method, EnvironmentFailure if its package is not installed.
     """
-    from mstmm.runtime.run import classical_run
-    from mstmm.runtime.run.external_integrators import sundials
+    from mstmm.runtime.run import classical_run, sundials
 
     if name in classical_run.METHODS:
         return

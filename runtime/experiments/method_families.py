@@ -9,8 +9,7 @@ from mstmm.scene.validators.validation_messages import did_you_mean
 
 from ..integrate.steppers import AUTO, INDEX3_SUFFIX, get, names
 from ..integrate.steppers.implicit_methods import ALPHA, DIRK, EXPONENTIAL, ROSENBROCK
-from ..run import classical_run, external_integrators
-from ..run.external_integrators import sundials
+from ..run import classical_run, external_integrators, sundials
 from .trial import Setting
 
 #: Relative tolerances from loose to tight.

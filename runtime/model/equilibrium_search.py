@@ -35,7 +35,7 @@ from ..engine.tangent_matrix import TangentMatrix
 from ..packing.scene_packing import packed_system
 from ..packing.system_variants import with_rotors
 from ..run.scene_system import SceneSystem
-from ..run.static_start.closed_states import ClosedStates
+from ..run.start_state import ClosedStates
 
 if TYPE_CHECKING:
     from ..engine.compiled_scene import CompiledScene

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from ..engine.loops.branches import Branch
     from ..engine.loops.loop_analysis import LoopAnalysis
     from ..result.batch_result import BatchResult
-    from ..run.batch.batch_inputs import BatchInput
+    from ..run.batch_inputs import BatchInput
     from .assembly import Assembly
     from .equilibrium import Equilibrium
     from .session import Session
@@ -285,7 +285,7 @@ class Model(LinearAnalysis, SimulatedScene, PublicMembers, NotebookDisplay):
         Raises SceneError for invalid settings, shapes or parameters.
         """
         from ..result.batch_result import BatchResult
-        from ..run.batch.batch_run import prepare_batch, simulate_batch
+        from ..run.batch_run import prepare_batch, simulate_batch
 
         chosen, times = to_method(method), to_output_times(output_times)
         settings = Settings(

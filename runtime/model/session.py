@@ -24,13 +24,12 @@ from ..integrate.settings import Settings
 from ..integrate.steppers import AUTO
 from ..result.factory import result_of
 from ..run import classical_run, external_integrators
-from ..run.engine_choice import code_for_any_length
 from ..run.integration_run import SLICE, make_run, needs_projection, project_samples, split
 from ..run.measured_quantities import MeasuredOutputs, reject_one_way
-from ..run.run_notes import missed_switch_note
+from ..run.run_execution import code_for_any_length
+from ..run.run_messages import missed_switch_note, stop_message
 from ..run.scene_system import SceneSystem
 from ..run.step_stability import check_step
-from ..run.stop_messages import stop_message
 
 if TYPE_CHECKING:
     from ..engine.compiled_scene import CompiledScene

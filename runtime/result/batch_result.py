@@ -17,7 +17,7 @@ from mstmm.optional_packages import missing_package_error
 from mstmm.risk import RUN, AssessedResult, Risk
 
 from ..integrate.c_loop import Statistics, Status
-from ..run.batch.batch_run import BatchData
+from ..run.batch_run import BatchData
 from ..run.trajectory import Trajectory
 from .export import xarray_dataset
 from .export.result_files import save_dataset

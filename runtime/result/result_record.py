@@ -20,9 +20,8 @@ from ..integrate.settings import Settings
 from ..packing.coordinate_layout import HingeSlots
 from ..run.checkpoint import Checkpoint
 from ..run.error_estimate import ErrorEstimate
-from ..run.method_segments import MethodSegment
 from ..run.step_stability import StepCheck, check_step
-from ..run.trajectory import Trajectory
+from ..run.trajectory import MethodSegment, Trajectory
 from .certificate import Certificate
 from .flexible.quantities import FlexibleResults
 from .mesh_files import file_contents

@@ -20,9 +20,14 @@ from ..integrate.steppers.alpha_family import NewmarkFamily
 from ..packing.scene_packing import reject_loop_method, reject_speed_constraints
 from ..platform_support.interrupts import record_interrupts
 from .method_switching import MethodChoice
-from .run_notes import chattering_note, missed_switch_note, step_too_long_note
+from .run_messages import (
+    chattering_note,
+    missed_switch_note,
+    rest_note,
+    step_too_long_note,
+    stop_message,
+)
 from .scene_system import SceneSystem
-from .stop_messages import rest_note, stop_message
 from .trajectory import Trajectory
 
 #: Seconds of wall time between updates of progress, interrupts and checkpoints.

@@ -19,9 +19,9 @@ from ..integrate.c_loop import Integrator
 from ..integrate.settings import Settings
 from ..integrate.steppers import AUTO_EXPLICIT, get
 from ..packing.scene_packing import reject_qr_steps
-from .method_segments import MethodSegment, from_rows
 from .scene_system import SceneSystem
 from .spectral_radius import FastestMode
+from .trajectory import MethodSegment, from_rows
 
 #: Number of recent steps that must indicate a change: to an implicit method, and back.
 _STIFF_STEPS, _NONSTIFF_STEPS = 5, 10

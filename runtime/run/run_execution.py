@@ -1,35 +1,55 @@
-"""Runs for a Result: the run itself, its checkpoints, and the second run for its error."""
+"""Runs for a Result: engine, start, checkpoints, and the second run for the error.
+
+The choice of the engine never depends on a clock.  A scene without fused code starts on the looped
+engine.  After a given number of steps the evaluations of the whole run are extrapolated; if
+compilation pays, the run restarts on fused code, so that its results do not depend on when this was
+decided.
+"""
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from mstmm.array_validation import Array
-from mstmm.errors import MstmmError, SceneError
+from mstmm.errors import EnvironmentFailure, MstmmError, SceneError
 
+from ..engine.compiled_scene import CompiledScene
 from ..engine.failure_messages import REMEDY
+from ..engine.looped_engine import LoopedEngine
 from ..integrate.c_loop import Integrator, Samples, Status
 from ..integrate.settings import Settings
+from ..integrate.steppers import get
 from ..platform_support.interrupts import record_interrupts
 from . import classical_run, external_integrators
 from .checkpoint import Checkpoint, State
-from .engine_choice import FUSED, LOOPED, code_at_start, code_if_it_pays, steps_until_decision
 from .error_estimate import ErrorEstimate, compare, made_same_steps, reference_settings
-from .integration_run import advance, method_choice, status_message, trajectory
+from .integration_run import (
+    advance,
+    energy_at,
+    initial_method,
+    make_run,
+    method_choice,
+    status_message,
+    tolerances,
+    trajectory,
+    uses_position_constraints,
+)
 from .method_switching import MethodChoice
-from .start_cache import StartCache, return_start_cache, take_start_cache
+from .scene_system import SceneCode, SceneSystem
 from .step_stability import check_later, check_step
 from .trajectory import Trajectory
 
 if TYPE_CHECKING:
-    from ..engine.compiled_scene import CompiledScene
-    from ..engine.looped_engine import LoopedEngine
-    from .scene_system import SceneSystem
+    from ..kernels.scene_libraries import FusedLibrary
+
 
 Progress = Callable[[float, float], None]
 
@@ -235,3 +255,140 @@ def second_run(
     if not len(np.intersect1d(first.t, second.t)) or second.status is None:
         return None
     return compare(model.coordinate_layout, first, second, reference, q)
+
+
+#: Evaluations after which the evaluations of the whole run are extrapolated.
+_EXTRAPOLATE_AFTER = 2000
+
+LOOPED, FUSED = "looped", "fused"
+
+
+def code_at_start(
+    model: CompiledScene, settings: Settings, recorded: str | None
+) -> SceneCode | None:
+    """Fused code for a run that starts now; None for the looped engine.
+
+    Args:
+        model: the model.
+        settings: of the run.
+        recorded: engine of the run that is restarted from a checkpoint; None for a new run.
+
+    Raises EnvironmentFailure if a run on fused code is to be restarted where no code can be built.
+    """
+    if recorded == LOOPED:
+        return None
+    library = model.fusion.library
+    if library is None and recorded == FUSED:
+        try:
+            library = model.fusion.build()
+        except (EnvironmentFailure, SceneError) as error:
+            raise EnvironmentFailure(
+                f"checkpoint: the run began on fused code, which cannot be compiled now ({error}); "
+                "run without resume to start again"
+            ) from None
+    return None if library is None else _scene_code(model, settings, library, math.inf)
+
+
+def code_for_any_length(model: CompiledScene, settings: Settings) -> SceneCode | None:
+    """Fused code for a run of unknown length, compiled if that can pay at all; else None."""
+    library = model.fusion.ready(math.inf)
+    return None if library is None else _scene_code(model, settings, library, math.inf)
+
+
+def steps_until_decision(model: CompiledScene, settings: Settings) -> int:
+    """Steps of a looped run after which `code_if_it_pays` is to be called; 0 for never."""
+    if model.fusion.obstacle:
+        return 0
+    return math.ceil(_EXTRAPOLATE_AFTER / get(settings.first_method).n_stages)
+
+
+def code_if_it_pays(model: CompiledScene, settings: Settings, run: Integrator) -> SceneCode | None:
+    """Fused code if compilation pays for a looped run, extrapolated from its time so far."""
+    elapsed = run.t - settings.t_start
+    if not elapsed > 0.0:
+        return None
+    evaluations = run.statistics.evaluations * (settings.t_end - settings.t_start) / elapsed
+    library = model.fusion.ready(evaluations)
+    return None if library is None else _scene_code(model, settings, library, evaluations)
+
+
+def _scene_code(
+    model: CompiledScene, settings: Settings, library: FusedLibrary, evaluations: float
+) -> SceneCode:
+    """Code with SIMD lanes only for iterated methods; implicit code is compiled on first use."""
+    fusion, iterated = model.fusion, get(settings.first_method).iterated is not None
+    lanes = fusion.ready_lanes(evaluations) if iterated else None
+    implicit = partial(fusion.ready_implicit, evaluations)
+    return SceneCode(library, lanes, fusion.numbers, fusion.inputs, implicit)
+
+
+#: Largest number of state components; runs of more take so long that reuse saves nothing.
+_MAX_STATES = 200
+
+
+class StartCache:
+    """System and integrator for successive runs of one engine over the same times.
+
+    They are reused while the fused code and the constraint level of the method are the same.
+    """
+
+    def __init__(self) -> None:
+        self._cached: tuple[SceneSystem, Integrator] | None = None
+        #: Time (s), state and energy (J) of the last start.
+        self._start_energy: tuple[float, Array, float] | None = None
+
+    def begin(
+        self,
+        engine: LoopedEngine,
+        compiled: SceneCode | None,
+        settings: Settings,
+        q: Array,
+        u: Array,
+    ) -> tuple[SceneSystem, Integrator]:
+        """System and integrator at the start of a run from (nq,), (nu,)."""
+        if self._cached is None or not self._is_reusable(self._cached[0], compiled, settings):
+            system = SceneSystem(engine, compiled)
+            run = make_run(system, settings, q, u, energy=self._energy_at)
+            self._cached = system, run
+            return system, run
+        system, run = self._cached
+        tableau = initial_method(system, settings)
+        system.memory[:] = engine.start_memory()
+        start = system.begin(settings.t_start, q, u)
+        run.start(tableau, settings, start, tolerances(system, settings, start, self._energy_at))
+        return system, run
+
+    @staticmethod
+    def _is_reusable(system: SceneSystem, compiled: SceneCode | None, settings: Settings) -> bool:
+        same_level = system.uses_position_level == uses_position_constraints(settings)
+        return system.uses_code(compiled) and same_level
+
+    def _energy_at(self, system: SceneSystem, t: float, start: Array) -> float:
+        """Energy of the start in J, computed once for runs from the same start."""
+        cached = self._start_energy
+        if cached is None or cached[0] != t or not np.array_equal(cached[1], start):
+            cached = self._start_energy = t, start.copy(), energy_at(system, t, start)
+        return cached[2]
+
+
+#: Start cache of a model's last run, with the times for which it is valid.
+_last_caches: WeakKeyDictionary[CompiledScene, tuple[object, StartCache]] = WeakKeyDictionary()
+
+
+def take_start_cache(model: CompiledScene, settings: Settings) -> StartCache:
+    """Take the start cache of the model's last run if its times are the same, else a new one.
+
+    Taking removes it, so that only one of several threads uses it.
+    """
+    times, cache = _last_caches.pop(model, (None, None))
+    return StartCache() if cache is None or times != _times(settings) else cache
+
+
+def return_start_cache(model: CompiledScene, settings: Settings, beginnings: StartCache) -> None:
+    """Return the start cache of a finished run, for the model's next run."""
+    if model.nq + model.nu <= _MAX_STATES:
+        _last_caches[model] = _times(settings), beginnings
+
+
+def _times(settings: Settings) -> object:
+    return settings.t_start, settings.t_end, settings.output_times

@@ -16,7 +16,7 @@
 #define MOVED 1e-12
 
 /* Relative positions and speeds, of those that the event reads or of 1 rad or m and 1 s, that are
- * still on it, and do not move against it; as runtime/run/contact_start.py has it. */
+ * still on it, and do not move against it; as runtime/run/scene_system.py has it. */
 #define CLOSE 1e-9
 
 /* Numbers of a bounce: derivatives of its event, efforts, and three columns of speeds. */

@@ -25,8 +25,7 @@ from ...integrate.steppers import AUTO
 from ...platform_support.interrupts import Interrupt, record_interrupts
 from ...result.factory import result_of
 from ...run.error_estimate import compare
-from ...run.run_execution import RunMonitor, first_run
-from ...run.start_cache import return_start_cache, take_start_cache
+from ...run.run_execution import RunMonitor, first_run, return_start_cache, take_start_cache
 from ..error_measure import Coordinates, Measure, Quantities
 from ..run_request import ErrorRequest
 from ..trial import Setting, Trial, sample_distances

@@ -22,8 +22,7 @@ from ...integrate.steppers.alpha_family import parse_scheme
 from ...kernels.prebuilt_kernels import kernels_hash
 from ...run import classical_run, external_integrators
 from ...run.error_estimate import ErrorEstimate
-from ...run.method_segments import from_rows
-from ...run.trajectory import Trajectory
+from ...run.trajectory import Trajectory, from_rows
 
 if TYPE_CHECKING:
     from ..result_record import Record

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 import mstmm
 from mstmm.runtime.engine import jacobian
-from mstmm.runtime.run.external_integrators import Equations
+from mstmm.runtime.run.event_location import Equations
 from tests.support.scenes.results import motor, pins, tree
 
 Array = NDArray[np.float64]

@@ -11,7 +11,7 @@ import pytest
 import mstmm
 from mstmm.runtime.integrate.c_loop import Status
 from mstmm.runtime.result.result import Result
-from mstmm.runtime.run.external_integrators import Equations
+from mstmm.runtime.run.event_location import Equations
 
 METHODS: dict[str, dict[str, Any]] = {
     "dop853": {}, "dopri5": {}, "pirk13": {}, "auto": {}, "rk4": {"step": 0.7},

@@ -179,7 +179,7 @@ def test_scipys_methods_end_where_a_motion_sticks() -> None:
 def test_many_conditions_are_watched_up_to_a_limit(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("mstmm.runtime.packing.event_functions.MAX_SWITCHES", 1)
     monkeypatch.setattr("mstmm.runtime.run.scene_system.MAX_SWITCHES", 1)
-    monkeypatch.setattr("mstmm.runtime.run.run_notes.MAX_SWITCHES", 1)
+    monkeypatch.setattr("mstmm.runtime.result.checks.run_checks.MAX_SWITCHES", 1)
     result = simulate_effort("where(q > 1, where(q < 2, 0.1, 0), 0)", 1.0)
     assert any("more than 1 conditions depend on the motion" in text for text in result.warnings)
 

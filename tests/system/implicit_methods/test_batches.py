@@ -10,7 +10,7 @@ import pytest
 
 import mstmm
 from mstmm.runtime.integrate.steppers import IMPLICIT, get
-from tests.runtime.run.batch.test_batch_run import rod_model
+from tests.runtime.run.test_batch_run import rod_model
 from tests.runtime.run.test_checkpoint import interrupt_run
 from tests.support.implicit_methods import motions
 from tests.support.integration.compiled_systems import same_bits

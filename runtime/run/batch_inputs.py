@@ -13,12 +13,12 @@ from mstmm.array_validation import Array, finite_array, mapping_by_name
 from mstmm.errors import SceneError
 from mstmm.numerics.piecewise_polynomial import PiecewisePolynomial, constant, interpolate
 
-from ...discontinuities.active_expressions import active_expressions
-from ...discontinuities.expression_functions import ExpressionFunctions
-from ...engine.inputs import InputValue, with_input_pieces
+from ..discontinuities.active_expressions import active_expressions
+from ..discontinuities.expression_functions import ExpressionFunctions
+from ..engine.inputs import InputValue, with_input_pieces
 
 if TYPE_CHECKING:
-    from ...engine.compiled_scene import CompiledScene
+    from ..engine.compiled_scene import CompiledScene
 
 #: As in `simulate`, or numbers (n,), one per trajectory, or values (n, m) over times (m,).
 BatchInput = InputValue | ArrayLike

@@ -29,14 +29,16 @@ from mstmm.array_validation import (
 )
 from mstmm.errors import MstmmError, SceneError
 
-from ...discontinuities.active_expressions import active_expressions
-from ...integrate.c_loop import Failure, Integrator, Status, failure_text
-from ...integrate.settings import Settings, validate
-from ...integrate.steppers import AUTO, check_size, check_steps, get
-from ...packing.event_functions import has_switches
-from ...packing.scene_parameters import with_parameters
-from .. import classical_run, external_integrators
-from ..integration_run import (
+from ..discontinuities.active_expressions import active_expressions
+from ..integrate.c_loop import Failure, Integrator, Status, failure_text
+from ..integrate.settings import Settings, validate
+from ..integrate.steppers import AUTO, check_size, check_steps, get
+from ..packing.event_functions import has_switches
+from ..packing.scene_parameters import with_parameters
+from . import classical_run, external_integrators
+from .batch_inputs import BatchInput, BatchInputs, batch_inputs, row_count
+from .batch_lanes import LaneInputs, Lanes, run_lanes, run_on_threads
+from .integration_run import (
     advance,
     make_run,
     method_choice,
@@ -44,15 +46,12 @@ from ..integration_run import (
     status_message,
     trajectory,
 )
-from ..method_segments import MethodSegment
-from ..scene_system import SceneCode, SceneSystem
-from .batch_inputs import BatchInput, BatchInputs, batch_inputs, row_count
-from .interruptible_threads import run_on_threads
-from .simd_lanes import LaneInputs, Lanes, run_lanes
+from .scene_system import SceneCode, SceneSystem
+from .trajectory import MethodSegment
 
 if TYPE_CHECKING:
-    from ...engine.compiled_scene import CompiledScene
-    from ...kernels.scene_libraries import FusedLibrary
+    from ..engine.compiled_scene import CompiledScene
+    from ..kernels.scene_libraries import FusedLibrary
 
 
 @dataclass(frozen=True)

@@ -1,11 +1,12 @@
-"""Trajectories in SIMD lanes and on threads: the interface to `integrate/c/simd_lanes.c`."""
+"""Trajectories in SIMD lanes, by `integrate/c/simd_lanes.c`, and threads that stop on Ctrl-C."""
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -13,18 +14,18 @@ from mstmm.array_validation import Array
 from mstmm.errors import SceneError
 from mstmm.numerics.piecewise_polynomial import PiecewisePolynomial
 
-from ...engine.inputs import IndexPairs, LiveInputs
-from ...engine.looped_engine import LoopedEngine
-from ...integrate.c_loop import Status
-from ...integrate.c_tableau import c_tableau
-from ...integrate.settings import Settings
-from ...integrate.steppers import get
-from ...kernels.c_records import Memory
-from ...kernels.scene_libraries import FusedLibrary
-from ...packing.records.model_record import write_inputs
-from ..integration_run import SLICE
-from ..scene_system import SceneSystem
-from .interruptible_threads import run_on_threads
+from ..engine.inputs import IndexPairs, LiveInputs
+from ..engine.looped_engine import LoopedEngine
+from ..integrate.c_loop import Status
+from ..integrate.c_tableau import c_tableau
+from ..integrate.settings import Settings
+from ..integrate.steppers import get
+from ..kernels.c_records import Memory
+from ..kernels.scene_libraries import FusedLibrary
+from ..packing.records.model_record import write_inputs
+from ..platform_support.interrupts import record_interrupts
+from .integration_run import SLICE
+from .scene_system import SceneSystem
 
 
 class LaneInputs:
@@ -143,3 +144,30 @@ def _make_group(
     lanes.inputs.fill(view, ffi)
     keep_alive += [system, view, scratch, workspace, lanes.inputs]
     return group
+
+
+T = TypeVar("T")
+
+
+def run_on_threads(
+    work: Callable[[T], None], items: Iterable[T], threads: int, stop: threading.Event
+) -> None:
+    """Call `work` for every item on several threads, and raise the first exception of a call.
+
+    After a failure or an interrupt `stop` is set, which `work` must check often, and no further
+    call starts.  Raises KeyboardInterrupt after an interrupt, once all threads have stopped.
+    """
+    with record_interrupts() as interrupted, ThreadPoolExecutor(threads) as pool:
+        futures = [pool.submit(work, item) for item in items]
+        waiting, failed = set(futures), False
+        while waiting and not (failed or interrupted):
+            done, waiting = wait(waiting, timeout=SLICE, return_when=FIRST_EXCEPTION)
+            failed = any(future.exception() is not None for future in done)
+        if waiting:
+            stop.set()
+            pool.shutdown(cancel_futures=True)
+    for future in futures:
+        if not future.cancelled():
+            future.result()
+    if waiting:
+        raise KeyboardInterrupt

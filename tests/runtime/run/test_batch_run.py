@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 import mstmm
 from mstmm.errors import SceneError
 from mstmm.runtime.model.model import Model
-from mstmm.runtime.run.batch import interruptible_threads as on_threads
+from mstmm.runtime.run import batch_lanes as on_threads
 from tests.support.integration.compiled_systems import same_bits
 
 RUN: dict[str, Any] = {"t_end": 1.5, "rtol": 1e-9, "atol": 1e-11, "output_times": [0.4, 1.1, 1.5]}

@@ -7,8 +7,7 @@ import pytest
 
 import mstmm
 from mstmm.runtime.integrate.settings import Settings
-from mstmm.runtime.run.run_execution import RunMonitor, first_run
-from mstmm.runtime.run.start_cache import StartCache
+from mstmm.runtime.run.run_execution import RunMonitor, StartCache, first_run
 from tests.support.paths import EXAMPLES
 
 #: Loose and tight, explicit and implicit, and one that chooses: each leaves something behind.

@@ -15,7 +15,7 @@ from mstmm.runtime.integrate.steppers import IMPLICIT, get
 from mstmm.runtime.integrate.steppers.alpha_family import NewmarkFamily
 from mstmm.runtime.integrate.steppers.exprb32 import Exponential
 from mstmm.runtime.integrate.steppers.implicit_methods import Implicit
-from tests.runtime.run.test_stop_messages import check_remains, singular
+from tests.runtime.run.test_run_messages_stops import check_remains, singular
 from tests.support.implicit_methods import motions
 from tests.support.scenes.results import pins
 

@@ -16,6 +16,7 @@ import mstmm
 from mstmm.errors import SceneError
 from mstmm.runtime.integrate.c_loop import Status
 from mstmm.runtime.run import external_integrators
+from mstmm.runtime.run.event_location import Equations
 from tests.support.scenes.results import motor, pins, rod, tree
 
 Array = NDArray[np.float64]
@@ -144,13 +145,13 @@ def test_a_largest_number_of_steps(method: str) -> None:
 def test_a_trial_that_failed_and_recovered_is_not_blamed_for_the_end(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    class Stumbling(external_integrators.Equations):
+    class Stumbling(Equations):
         def rates(self, t: float, y: Array) -> Array:
             if 0.01 < t < 0.1:
                 self.failure = 'spring "band" at t = 0.05 s'
             return super().rates(t, y)
 
-    monkeypatch.setattr(external_integrators.solver_loop, "Equations", Stumbling)
+    monkeypatch.setattr(external_integrators, "Equations", Stumbling)
     model = mstmm.compile(motor("1/max(0.5 - t, 0)^2", speed=1.0))
     run = model.simulate(1.0, method="scipy-RK45", rtol=1e-6)
     assert not run.success and "band" not in run.message and "0.5" in run.message

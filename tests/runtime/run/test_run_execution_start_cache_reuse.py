@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import mstmm
-from mstmm.runtime.run import start_cache
+from mstmm.runtime.run import run_execution
 from tests.support.paths import ROOT
 from tests.support.scenes.results import rod
 
@@ -56,12 +56,12 @@ def test_every_run_is_as_a_first_one(engine: str, monkeypatch: pytest.MonkeyPatc
     asked = [(q, each) for q in STARTS for each in how]
     model = mstmm.compile(scene(), engine=engine)
     later = [run(model, q, **each) for q, each in asked]
-    assert model in start_cache._last_caches
-    monkeypatch.setattr(start_cache, "_MAX_STATES", 0)
+    assert model in run_execution._last_caches
+    monkeypatch.setattr(run_execution, "_MAX_STATES", 0)
     for (q, each), found in zip(asked, later, strict=True):
         first = mstmm.compile(scene(), engine=engine)
         assert are_same_runs(run(first, q, **each), found)
-        assert first not in start_cache._last_caches
+        assert first not in run_execution._last_caches
 
 
 def test_among_closed_loops(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -70,7 +70,7 @@ def test_among_closed_loops(monkeypatch: pytest.MonkeyPatch) -> None:
     how = ("dop853", "genalpha-index3", "genalpha", "genalpha-index3", "rk4")
     model = mstmm.compile(four_bar, engine="looped")
     later = [model.simulate(0.2, one, step=2e-3, output_times=[0.2]) for one in how]
-    monkeypatch.setattr(start_cache, "_MAX_STATES", 0)
+    monkeypatch.setattr(run_execution, "_MAX_STATES", 0)
     for one, found in zip(how, later, strict=True):
         first = mstmm.compile(four_bar, engine="looped")
         assert are_same_runs(first.simulate(0.2, one, step=2e-3, output_times=[0.2]), found), one

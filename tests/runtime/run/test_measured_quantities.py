@@ -13,7 +13,7 @@ from scipy.linalg import expm
 import mstmm
 from mstmm.errors import NumericalFailure, SceneError
 from mstmm.runtime.model.model import Model
-from mstmm.runtime.run.external_integrators import Equations
+from mstmm.runtime.run.event_location import Equations
 from tests.support.scenes.minimal import body
 
 ENGINES = ["looped", "fused"]

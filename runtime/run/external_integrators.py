@@ -18,20 +18,32 @@ import numpy as np
 from mstmm.array_validation import Array
 from mstmm.errors import SceneError
 
-from ...integrate.c_loop import Failure, Samples, Statistics, Status, failure_text
-from ...integrate.settings import Settings
-from ...platform_support.interrupts import Interrupt, record_interrupts
-from ..integration_run import split, tolerances
-from ..run_notes import chattering_note, missed_switch_note
-from ..stop_messages import curve_end_message, expression_cause, fastest_speed, rest_note
-from ..trajectory import Trajectory
+from ..integrate.c_loop import Failure, Samples, Statistics, Status, failure_text
+from ..integrate.settings import Settings
+from ..platform_support.interrupts import Interrupt, record_interrupts
 from . import sundials
-from .callbacks import Equations, RunEnded
-from .event_location import ConditionValues, StepConditions
-from .switch_crossings import Crossings, ProgressCheck, shortened_step_end
+from .event_location import (
+    ConditionValues,
+    Crossings,
+    Equations,
+    ProgressCheck,
+    RunEnded,
+    StepConditions,
+    shortened_step_end,
+)
+from .integration_run import split, tolerances
+from .run_messages import (
+    chattering_note,
+    curve_end_message,
+    expression_cause,
+    fastest_speed,
+    missed_switch_note,
+    rest_note,
+)
+from .trajectory import Trajectory
 
 if TYPE_CHECKING:
-    from ...engine.compiled_scene import CompiledScene
+    from ..engine.compiled_scene import CompiledScene
 
 
 #: Method of `simulate` -> name of SciPy's class, or of CVODE's method.

@@ -1,1 +1,0 @@
-"""Many independent runs of one model."""

@@ -1,1 +1,0 @@
-"""Static starts: static deformations of flexible bodies, with and without closed loops."""
