@@ -6,13 +6,11 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from .tuning import CHART as TUNING
+
 #: Fractions of the budget after which the reference, the settings of promising methods, and those
 #: of all methods must be done; the rest is for repeated timing.
 REFERENCE, EARLY, SETTINGS, ALL = 0.35, 0.6, 0.8, 1.0
-
-#: A run may take the remaining time over the first number, or over the number of waiting curves per
-#: second number, which is less if more than thirty curves wait.
-_MIN_SHARES, _CURVES_PER_SHARE = 6.0, 5.0
 
 
 class OutOfTime(BaseException):
@@ -44,7 +42,7 @@ class Budget:
 
     def run_limit(self, part: float, waiting: int = 1) -> float:
         """Time limit of the next run, s, while `waiting` curves are not finished."""
-        return self.remaining(part) / max(_MIN_SHARES, waiting / _CURVES_PER_SHARE)
+        return self.remaining(part) / max(TUNING.min_shares, waiting / TUNING.curves_per_share)
 
     def alarm(self, seconds: float) -> Callable[[float, float], None]:
         """Progress callback for `simulate` that raises OutOfTime after `seconds`."""

@@ -21,6 +21,7 @@ from .error_measure import Measure
 from .method_families import family
 from .runs import Report, Runs
 from .trial import Setting, Trial, max_error
+from .tuning import CHART as TUNING
 
 if TYPE_CHECKING:
     from .simulation import SimulatedScene
@@ -34,9 +35,6 @@ CANDIDATES: Mapping[str, Sequence[float]] = {
     "rodas5p": (1e-8, 1e-10, 1e-11),
     "kvaerno5": (1e-8, 1e-10, 1e-11),
 }
-
-#: Largest expected growth of CPU time for a tolerance a hundred times tighter.
-_GROWTH = 4.0
 
 
 @dataclass(frozen=True)
@@ -99,7 +97,7 @@ def _run_candidate(
         limit = (
             runs.budget.remaining(REFERENCE) / 2
         )  # the other half leaves time for another method
-        if trials and _GROWTH * trials[-1].cpu_s > limit:
+        if trials and TUNING.reference_growth * trials[-1].cpu_s > limit:
             return trials, f"{setting} would take too long", True
         report(f"reference by {method}, {setting}")
         trial = runs.trial(model, setting, measure, limit)

@@ -23,6 +23,7 @@ from ..model_levels import Variant, model_levels, planar_level
 from ..reference import Converged, compute_reference
 from ..runs import Compile, Report, Runs, scene_warnings
 from ..trial import Setting, Trial, max_error
+from ..tuning import CHART as TUNING
 from .chart_record import ChartRecord, Level, Reference, Skipped, bound_errors, split_warnings
 from .html_page import page
 from .matplotlib_plot import has_matplotlib, plot
@@ -73,16 +74,8 @@ class Chart(ChartRecord):
         return tuple(paths)
 
 
-#: Relative tolerance of the runs with method "auto" that measure the errors of model levels.
-_LEVEL_RTOL = 1e-8
-#: Relative tolerance of the run whose steps show where the motion is fast.
-_STEP_SIZE_RTOL = 1e-6
 #: Coordinates that change by less than this (m, rad, or relative to their size) do not move.
 _MOTION_TOLERANCE = 1e-12
-#: Model levels with errors below this many times `_LEVEL_RTOL` use the setting of the reference.
-_ACCURATE_LEVEL_FACTOR = 1e3
-#: Fraction of the budget after which the errors of the model levels must be known.
-_LEVEL_BUDGET = 0.45
 #: Reason why there is only one model level.
 _NO_MODELS = (
     "no model levels to compare: the scene has no flexible bodies, and no hinge that a planar "
@@ -216,7 +209,7 @@ class _ChartBuilder:
     def _refine_times(self, richest: SimulatedScene, name: str) -> None:
         """Add times where the motion is fast, unless the run for that takes too long."""
         self.report("run to choose the times of the error")
-        setting = Setting(AUTO, name, _STEP_SIZE_RTOL)
+        setting = Setting(AUTO, name, TUNING.step_size_rtol)
         limit = self.budget.run_limit(REFERENCE)
         result, _ = self.runs.try_simulate(richest, setting.options, limit, own_steps=True)
         if result is None or not result.is_comparable or not len(result.t):
@@ -315,12 +308,12 @@ class _ChartBuilder:
 
         An accurate level needs the setting of the reference for that.
         """
-        limit = self.budget.run_limit(_LEVEL_BUDGET)
-        run = self.runs.trial(model, Setting(AUTO, level, _LEVEL_RTOL), measure, limit)
+        limit = self.budget.run_limit(TUNING.level_budget)
+        run = self.runs.trial(model, Setting(AUTO, level, TUNING.level_rtol), measure, limit)
         if run.numbers is None:
             return run
         error, reason = max_error(run, best.trial, measure)
-        if reason or error > _ACCURATE_LEVEL_FACTOR * _LEVEL_RTOL:
+        if reason or error > TUNING.accurate_level_factor * TUNING.level_rtol:
             return run
         tight = replace(best.trial.setting, model=level)
         tighter = self.runs.trial(model, tight, measure, limit)
@@ -338,13 +331,6 @@ def _is_static(q: Array) -> bool:
         (q.max(axis=0) - q.min(axis=0) <= _MOTION_TOLERANCE * np.maximum(1.0, abs(q[0]))).all()
     )
 
-
-#: Largest number of times, relative to the equidistant ones.
-_MAX_COUNT_FACTOR = 4
-
-#: Steps between two equidistant times that indicate fast motion; every run begins with two or three
-#: short steps, which do not.
-_FAST_STEP_COUNT = 4
 
 #: Times closer together than this fraction of the run are merged.
 _MERGE_FRACTION = 1e-12
@@ -372,10 +358,10 @@ def refine_times(times: Times, steps: Array) -> Times:
     min_distance = _MERGE_FRACTION * (last - first)
     inside = steps[(steps > first) & (steps < last)]
     interval = np.searchsorted(times.times, inside) - 1
-    is_fast = np.bincount(interval, minlength=len(times.times)) >= _FAST_STEP_COUNT
+    is_fast = np.bincount(interval, minlength=len(times.times)) >= TUNING.fast_step_count
     distances = np.minimum(inside - times.times[interval], times.times[interval + 1] - inside)
     added = np.unique(inside[is_fast[interval] & (distances > min_distance)])
-    max_count = (_MAX_COUNT_FACTOR - 1) * len(times.times)
+    max_count = (TUNING.max_count_factor - 1) * len(times.times)
     if len(added) > max_count:
         added = added[np.linspace(0, len(added) - 1, max_count).round().astype(int)]
     if not len(added):

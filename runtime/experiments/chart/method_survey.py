@@ -15,24 +15,15 @@ from ..error_measure import Measure
 from ..method_families import settings
 from ..runs import Runs
 from ..trial import Setting, Trial, max_error
+from ..tuning import CHART as TUNING
 from .chart_record import Point, Skipped
 
 if TYPE_CHECKING:
     from ..simulation import SimulatedScene
 
 
-#: Estimated growth of CPU time from one setting to the next: after one point, and the largest and
-#: smallest growth assumed after two.
-_GROWTH, _MAX_GROWTH, _MIN_GROWTH = 2.0, 10.0, 1.0
-
-#: CPU time (s) beyond which the loading of a method is negligible.
-_LOADING_LIMIT = 1.0
-
 #: Reason why a curve ends before its last setting.
 _NO_TIME = "too little time left"
-
-#: A curve ends once its error is within this factor of the error of its model level.
-_LEVEL_ERROR_FACTOR = 1.1
 
 
 @dataclass
@@ -56,9 +47,9 @@ class Curve:
         """Estimated CPU time of the next setting, s; 0 if unknown."""
         if not self.costs:
             return 0.0
-        growth = _GROWTH
+        growth = TUNING.growth
         if len(self.costs) > 1 and self.costs[-2] > 0:
-            growth = min(max(self.costs[-1] / self.costs[-2], _MIN_GROWTH), _MAX_GROWTH)
+            growth = min(max(self.costs[-1] / self.costs[-2], TUNING.min_growth), TUNING.max_growth)
         return growth * self.costs[-1]
 
 
@@ -75,8 +66,8 @@ def method_curve(
     `floor` is the smallest error that the reference resolves.
     """
     enough, why = floor, "the reference does not resolve smaller errors"
-    if level_error is not None and _LEVEL_ERROR_FACTOR * level_error > floor:
-        enough = _LEVEL_ERROR_FACTOR * level_error
+    if level_error is not None and TUNING.level_error_factor * level_error > floor:
+        enough = TUNING.level_error_factor * level_error
         why = "the remaining error is that of the model level"
     return Curve(method, level, model, enough, why, settings(method, level, t_end))
 
@@ -150,7 +141,7 @@ class Survey:
 
 def _may_include_loading(trial: Trial, model: SimulatedScene) -> bool:
     """Whether the CPU time of a first call may include loading or compiling the method."""
-    return trial.cpu_s < _LOADING_LIMIT or model.engine != "looped"
+    return trial.cpu_s < TUNING.loading_limit or model.engine != "looped"
 
 
 def chart_point(trial: Trial, reference: Trial, measure: Measure) -> Point:
@@ -173,13 +164,6 @@ def chart_point(trial: Trial, reference: Trial, measure: Measure) -> Point:
 
 # --- repeated timing ---
 
-#: Runs that take more than the remaining time over this number are not repeated: their times vary
-#: little, and they would leave too little time for the others.
-_MIN_RUNS = 50.0
-
-#: In each round a short run is called repeatedly up to this CPU time (s) and number of calls.
-_ROUND_CPU_S, _MAX_CALLS = 5e-3, 5
-
 
 def repeat_timings(
     points: list[Point],
@@ -194,7 +178,7 @@ def repeat_timings(
     that no longer fit into the budget; very long runs are not repeated.
     """
     timed = list(points)
-    longest = runs.budget.remaining() / _MIN_RUNS
+    longest = runs.budget.remaining() / TUNING.min_runs
     times = {i: point.cpu_s for i, point in enumerate(points) if point.cpu_s is not None}
     order = sorted((i for i in times if times[i] <= longest), key=lambda i: (times[i], i))
     missed: set[int] = set()
@@ -213,7 +197,7 @@ def _time_point(
     point = timed[i]
     assert point.cpu_s is not None
     left, once = runs.budget.remaining() - reserved, max(point.cpu_s, 1e-6)
-    calls = max(1, min(_MAX_CALLS, int(_ROUND_CPU_S / once)))
+    calls = max(1, min(TUNING.max_calls, int(TUNING.round_cpu_s / once)))
     if calls * once > left:
         return False
     cpu_s = runs.cpu_s(model, point.setting, left, calls)

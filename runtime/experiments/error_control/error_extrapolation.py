@@ -20,11 +20,10 @@ import numpy as np
 
 from mstmm.array_validation import Array
 
+from ..tuning import ERROR_CONTROL as TUNING
+
 #: Tightest meaningful tolerance.
 TIGHTEST = 1e-13
-
-#: Tolerance below which differences may be rounding, so that two runs show no decrease of errors.
-_ROUNDING = 5e-12
 
 
 class Kind(Enum):
@@ -37,7 +36,7 @@ class Kind(Enum):
 
 @dataclass(frozen=True)
 class _KindParameters:
-    """Parameters of a kind of method, typical values from experience.
+    """Parameters of a kind of method, set by benchmarks/error_control.
 
     Attributes:
         first: first tolerance relative to the target error, and its bounds.
@@ -75,55 +74,6 @@ _PARAMETERS = {
         (30.0, 1e-4, 1e-2), 1e6, 1.0, 1.0, 0.6, 0.6, 0.4, 1.5, 0.1, 1e-4
     ),
 }
-
-#: Sum of local errors relative to the tolerance where it is not known.
-_SUM_PER_RTOL = 15.0
-
-#: Share of an observed power that is used.  Powers of explicit runs scatter: one above the second
-#: number counts as the typical one.
-_POWER_SHARE, _POWER_NOISE = 0.9, 0.5
-
-#: Factor on the distance of only two runs, which may be near each other by chance.
-_TWO_RUN_FACTOR = 2.0
-
-#: Power between runs by different methods, and for errors that hardly decrease.  Runs of the
-#: exponential method show nothing about others.
-_POWER_BETWEEN_METHODS, _MIN_POWER = 0.5, 0.25
-
-#: Share of the target error at which a next tolerance aims after a comparison, for explicit and for
-#: other methods.  A further run costs more than tighter steps of high order.
-_TARGET_SHARE, _TARGET_SHARE_OTHERS = 0.5, 0.6
-
-#: Largest ratio of a next tolerance to the one before: to the first one, and to later ones.
-_MAX_FIRST_STEP, _MAX_LATER_STEP = 0.3, 0.1
-
-#: Smallest ratio of the first explicit tolerance after other kinds to the typical first one.
-_MIN_EXPLICIT_SHARE = 1e-4
-
-#: Largest and smallest ratio of a next tolerance to the one before, where runs have diverged.
-_MAX_DIVERGED_STEP, _MIN_DIVERGED_STEP = 1e-1, 1e-2
-
-#: Error relative to the sum of local errors, per radian of vibration that implicit steps resolve:
-#: its phase error persists.
-_GROWTH_PER_RADIAN = 0.25
-
-#: Share of the time after which a divergence of runs shows the growth of errors, and the factor on
-#: the estimate by this growth.
-_LATE_DIVERGENCE, _GROWTH_SAFETY = 0.8, 10.0
-
-#: First implicit tolerance relative to the target error, times the radians of vibration to resolve.
-_RTOL_PER_RADIAN = 10.0
-
-#: Smallest ratio of a next tolerance to the one before for calm runs: if that is at most the second
-#: number times the target error, so that errors may not decrease; and otherwise.
-_MIN_CALM_STEP, _NEAR_TARGET, _MIN_CALM_STEP_FAR = 0.1, 100.0, 3e-3
-
-#: Tolerance above which errors may be constant for a while: of implicit methods while they do not
-#: resolve vibrations, of long explicit steps by chance.
-_SLOW_DECAY_RTOL = 1e-7
-
-#: Largest number of runs.
-RUNS = 8
 
 
 @dataclass(frozen=True)
@@ -173,7 +123,7 @@ def first_rtol(target: float, kind: Kind, radians: float = 0.0) -> float:
     factor, tightest, loosest = _PARAMETERS[kind].first
     rtol = min(max(factor * target, tightest), loosest)
     if kind is Kind.IMPLICIT and radians > 1.0:
-        rtol = min(rtol, _RTOL_PER_RADIAN * target / radians)
+        rtol = min(rtol, TUNING.rtol_per_radian * target / radians)
     return max(min(rtol, _PARAMETERS[kind].max_first * target), TIGHTEST)
 
 
@@ -187,15 +137,16 @@ def estimate_error(runs: Sequence[ToleranceRun]) -> float | None:
     before, last = runs[-2:]
     reduction = (last.rtol / before.rtol) ** _error_power(runs) if last.rtol < before.rtol else 1.0
     parameters = _PARAMETERS[last.kind]
-    error = parameters.safety * before.distance * (_TWO_RUN_FACTOR if len(runs) == 2 else 1.0)
+    error = parameters.safety * before.distance * (TUNING.two_run_factor if len(runs) == 2 else 1.0)
     if before.distance < parameters.divergence:
-        is_constant = last.calm and before.calm and last.rtol >= 0.99 * _MIN_CALM_STEP * before.rtol
+        is_constant = last.calm and before.calm
+        is_constant &= last.rtol >= 0.99 * TUNING.min_calm_ratio * before.rtol
         return error * (1.0 if is_constant else reduction)
     if (
         before.kind is last.kind is Kind.EXPLICIT
-        and _LATE_DIVERGENCE <= before.divergence_fraction < 1.0
+        and TUNING.late_divergence <= before.divergence_fraction < 1.0
     ):
-        return min(error, _GROWTH_SAFETY * last.rtol * _error_growth(before))
+        return min(error, TUNING.growth_safety * last.rtol * _error_growth(before))
     return error
 
 
@@ -204,24 +155,23 @@ def next_rtol(runs: Sequence[ToleranceRun], target: float, kind: Kind) -> float:
 
     `target` is the target error relative to the size of the motion (1 for angles and ratios).
     """
-    last, error, tightest, max_factor = runs[-1], estimate_error(runs), TIGHTEST, _MAX_LATER_STEP
+    last, error = runs[-1], estimate_error(runs)
+    tightest, max_factor = TIGHTEST, TUNING.max_later_ratio
     if kind is not last.kind:
         return _rtol_of_other_kind(last, error, target, kind)
     if error is None or (runs[-2].kind, runs[-2].method) != (kind, last.method):
-        factor, tightest = _factor_by_local_errors(last, target), min(_ROUNDING, last.rtol / 2)
-        max_factor = _MAX_FIRST_STEP
+        tightest, max_factor = min(TUNING.rounding_rtol, last.rtol / 2), TUNING.max_first_ratio
+        factor = _factor_by_local_errors(last, target)
     elif not runs[-2].distance < _PARAMETERS[kind].divergence:
-        factor = _MAX_DIVERGED_STEP
+        factor = TUNING.max_diverged_ratio
         if kind is Kind.EXPLICIT and runs[-2].divergence_fraction < 1.0:
-            factor = min(
-                max(_rtol_without_divergence(runs[-2], target) / last.rtol, _MIN_DIVERGED_STEP),
-                _MAX_DIVERGED_STEP,
-            )
+            ratio = _rtol_without_divergence(runs[-2], target) / last.rtol
+            factor = min(max(ratio, TUNING.min_diverged_ratio), TUNING.max_diverged_ratio)
     else:
-        share = _TARGET_SHARE if kind is Kind.EXPLICIT else _TARGET_SHARE_OTHERS
+        share = TUNING.target_share if kind is Kind.EXPLICIT else TUNING.target_share_others
         factor, max_factor = (
             (share * target / error) ** (1 / _PARAMETERS[kind].power),
-            _MAX_FIRST_STEP,
+            TUNING.max_first_ratio,
         )
     return max(last.rtol * min(max(factor, _PARAMETERS[kind].min_factor), max_factor), tightest)
 
@@ -235,13 +185,14 @@ def _factor_by_local_errors(last: ToleranceRun, target: float) -> float:
     )
     if not last.calm:
         return factor
-    return max(factor, _MIN_CALM_STEP if last.rtol <= _NEAR_TARGET * target else _MIN_CALM_STEP_FAR)
+    is_near = last.rtol <= TUNING.near_target * target
+    return max(factor, TUNING.min_calm_ratio if is_near else TUNING.min_calm_ratio_far)
 
 
 def _rtol_without_divergence(before: ToleranceRun, target: float) -> float:
     """Tolerance at which a run should not diverge, at the error growth of a diverged run."""
     parameters = _PARAMETERS[before.kind]
-    share = _TARGET_SHARE * target / (before.rtol * _error_growth(before))
+    share = TUNING.target_share * target / (before.rtol * _error_growth(before))
     return before.rtol * min(share, 1.0) ** (1 / parameters.power)
 
 
@@ -262,32 +213,31 @@ def _rtol_of_other_kind(
     first = first_rtol(target, kind)
     if error is None or kind is not Kind.EXPLICIT:
         return first
-    sufficient = last.rtol * (_TARGET_SHARE * target / (_PARAMETERS[kind].safety * error)) ** (
-        1 / _POWER_BETWEEN_METHODS
-    )
-    return min(first, max(sufficient, _MIN_EXPLICIT_SHARE * first, TIGHTEST))
+    ratio = TUNING.target_share * target / (_PARAMETERS[kind].safety * error)
+    sufficient = last.rtol * ratio ** (1 / TUNING.power_between_methods)
+    return min(first, max(sufficient, TUNING.min_explicit_share * first, TIGHTEST))
 
 
 def no_gain_reason(runs: Sequence[ToleranceRun]) -> str:
     """Reason that no tolerance helps, or ""."""
     is_constant = len(runs) > 3 and not _error_decreases(runs) and not _error_decreases(runs[:-1])
     is_constant = is_constant and runs[-2].distance < _PARAMETERS[runs[-1].kind].divergence
-    if is_constant and runs[-1].rtol < _SLOW_DECAY_RTOL:
+    if is_constant and runs[-1].rtol < TUNING.slow_decay_rtol:
         return (
             "the error no longer decreases with the tolerance (rounding, or jumps of forces within "
             "steps)"
         )
     if runs[-1].rtol < 2 * TIGHTEST:  # runs at nearly the same tolerance show no difference
         return f"tolerances below {TIGHTEST:.0e} are below rounding"
-    return f"target not reached in {RUNS} runs" if len(runs) >= RUNS else ""
+    return f"target not reached in {TUNING.max_runs} runs" if len(runs) >= TUNING.max_runs else ""
 
 
 def _error_by_local_errors(run: ToleranceRun) -> float:
     """Estimated error of a run from its local errors."""
     parameters = _PARAMETERS[run.kind]
-    local_sum = run.local_error_sum or _SUM_PER_RTOL * run.rtol
+    local_sum = run.local_error_sum or TUNING.sum_per_rtol * run.rtol
     growth = parameters.limited_growth if run.is_stability_limited else parameters.growth
-    return local_sum * (run.growth or growth + _GROWTH_PER_RADIAN * run.radians)
+    return local_sum * (run.growth or growth + TUNING.growth_per_radian * run.radians)
 
 
 def _error_power(runs: Sequence[ToleranceRun]) -> float:
@@ -295,17 +245,17 @@ def _error_power(runs: Sequence[ToleranceRun]) -> float:
     before, last = runs[-2:]
     observed, parameters = _observed_power(runs), _PARAMETERS[last.kind].power
     if before.kind is not last.kind or before.method != last.method:
-        parameters = 0.0 if before.kind is Kind.EXPONENTIAL else _POWER_BETWEEN_METHODS
+        parameters = 0.0 if before.kind is Kind.EXPONENTIAL else TUNING.power_between_methods
     if observed is None:
-        return _MIN_POWER if last.rtol <= _ROUNDING else parameters
-    if last.kind is Kind.EXPLICIT and observed > _POWER_NOISE:
+        return TUNING.min_power if last.rtol <= TUNING.rounding_rtol else parameters
+    if last.kind is Kind.EXPLICIT and observed > TUNING.power_noise:
         return parameters
-    return min(max(_POWER_SHARE * observed, _MIN_POWER), parameters)
+    return min(max(TUNING.power_share * observed, TUNING.min_power), parameters)
 
 
 def _error_decreases(runs: Sequence[ToleranceRun]) -> bool:
     observed = _observed_power(runs)
-    return observed is None or observed > _MIN_POWER
+    return observed is None or observed > TUNING.min_power
 
 
 def _observed_power(runs: Sequence[ToleranceRun]) -> float | None:

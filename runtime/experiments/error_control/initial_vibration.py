@@ -19,25 +19,10 @@ from mstmm.errors import NumericalFailure
 from ...engine.jacobian import eigenvalues
 from ...packing.scene_packing import reject_qr_steps
 from ...run.spectral_radius import fastest_at_start
+from ..tuning import ERROR_CONTROL as TUNING
 
 if TYPE_CHECKING:
     from ...engine.compiled_scene import CompiledScene
-
-
-#: Largest number of coordinates and speeds for which all motions are computed.
-_MAX_COORDINATES = 64
-
-#: Motions with fewer radians over a run are slow, and part of the wanted motion.
-_SLOW_RADIANS = 10.0
-
-#: Ratio to the target error from which amplitudes are far above it; power of the weight of others.
-_FAR_ABOVE, _WEIGHT_POWER = 100.0, 0.7
-
-#: Share of the largest rate from which motions count as the fastest.
-_FAST_SHARE = 0.5
-
-#: Radians per step from which explicit steps do not resolve a motion.
-_UNRESOLVED_STEP = 2.0
 
 
 @dataclass(frozen=True)
@@ -71,10 +56,11 @@ class Vibration:
 
     def races(self, target: float) -> bool:
         """Whether the amplitude of a fastest motion is far above the target error."""
-        return bool((self._fastest_values(self.position_amplitudes) > _FAR_ABOVE * target).any())
+        amplitudes = self._fastest_values(self.position_amplitudes)
+        return bool((amplitudes > TUNING.far_above * target).any())
 
     def _fastest_values(self, numbers: Array) -> Array:
-        return numbers[self.rates >= _FAST_SHARE * self.rate]
+        return numbers[self.rates >= TUNING.fast_share * self.rate]
 
     def radians(self, target: float) -> float:
         """Largest number of radians until the amplitude of a motion is below `target`."""
@@ -82,11 +68,9 @@ class Vibration:
 
     def demanding_radians(self, target: float) -> float:
         """`radians`, weighted less for motions not far above `target`, whose phase may err more."""
-        return self._radians_above(
-            self.position_amplitudes,
-            target,
-            np.minimum(self.position_amplitudes / (_FAR_ABOVE * target), 1.0) ** _WEIGHT_POWER,
-        )
+        relative = np.minimum(self.position_amplitudes / (TUNING.far_above * target), 1.0)
+        weights = relative**TUNING.weight_power
+        return self._radians_above(self.position_amplitudes, target, weights)
 
     def radians_above_speed(self, target: float) -> float:
         """`radians` until the speed of a motion is below `target`."""
@@ -94,12 +78,12 @@ class Vibration:
 
     def outruns(self, steps: int) -> bool:
         """Whether so many steps over the run do not resolve the fastest motion."""
-        return self.rate * self.span > _UNRESOLVED_STEP * steps
+        return self.rate * self.span > TUNING.unresolved_step * steps
 
     def unresolved_amplitude(self, steps: int) -> float:
         """Largest amplitude of motions that so many steps do not resolve; 0 for none."""
         return float(
-            self.position_amplitudes[self.rates * self.span > _UNRESOLVED_STEP * steps].max(
+            self.position_amplitudes[self.rates * self.span > TUNING.unresolved_step * steps].max(
                 initial=0.0
             )
         )
@@ -128,7 +112,7 @@ def initial_vibration(
     """
     engine, empty = model.looped, np.zeros(0)
     y, memory = np.concatenate([q, u]), engine.start_memory()
-    if len(y) > _MAX_COORDINATES:
+    if len(y) > TUNING.max_coordinates:
         return Vibration(fastest_at_start(engine, t, q, u), span, empty, empty, empty, empty)
     reject_qr_steps(engine.packed)
     try:
@@ -141,7 +125,7 @@ def initial_vibration(
         participations = np.linalg.lstsq(vectors, rates.astype(np.complex128), rcond=None)[0]
     except np.linalg.LinAlgError:
         raise NumericalFailure(f"the motions at t = {t:.9g} s are not finite") from None
-    fast = np.abs(roots) * span > _SLOW_RADIANS
+    fast = np.abs(roots) * span > TUNING.slow_radians
     fast_rates, amplitudes = (np.abs(roots[fast]), np.abs(vectors[:, fast] * participations[fast]))
     amplitudes /= fast_rates
     q_parts = _relative_amplitudes(amplitudes[: len(q)], model.coordinate_layout.q_by_unit)
@@ -163,12 +147,6 @@ def _relative_amplitudes(amplitudes: Array, by_unit: dict[str, Integers]) -> Arr
 
 # --- beam on one hinge ----------------------------------------------------------------------------
 
-#: Largest number of speeds of such a beam, and of those that do not belong to shapes.
-_MAX_SPEEDS, _MAX_RIGID_SPEEDS = 6, 1
-
-#: Acceleration of a shape, relative to the largest one, that counts as excitation.
-_MIN_SHARE = 1e-3
-
 
 def starts_vibrating(model: CompiledScene, t: float, q: Array, u: Array) -> bool:
     """Whether a scene is a vibrating beam on one hinge at q (nq,), u (nu,) and t (s).
@@ -183,8 +161,10 @@ def starts_vibrating(model: CompiledScene, t: float, q: Array, u: Array) -> bool
     shapes = np.zeros(engine.nu, bool)
     for body in model.coordinate_layout.modal.values():
         shapes[body.u_slice] = True
-    if not shapes.any() or engine.nu > _MAX_SPEEDS or np.count_nonzero(~shapes) > _MAX_RIGID_SPEEDS:
+    is_small = engine.nu <= TUNING.max_beam_speeds
+    if not is_small or not shapes.any() or np.count_nonzero(~shapes) > TUNING.max_rigid_speeds:
         return False
     state = q[None].copy(), u[None].copy(), engine.start_memory()[None]
     accelerations = np.abs(engine.accelerations(t, *state)[1][0])
-    return bool(u[shapes].any() or accelerations[shapes].max() > _MIN_SHARE * accelerations.max())
+    threshold = TUNING.excitation_share * accelerations.max()
+    return bool(u[shapes].any() or accelerations[shapes].max() > threshold)

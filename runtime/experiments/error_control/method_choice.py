@@ -25,6 +25,7 @@ from ...result.checks.flexible import squared_frequencies
 from ...run import external_integrators
 from ...run.method_switching import implicit_method
 from ...run.spectral_radius import fastest_possible
+from ..tuning import ERROR_CONTROL as TUNING
 from .error_extrapolation import Kind
 from .initial_vibration import Vibration, initial_vibration, starts_vibrating
 
@@ -33,68 +34,15 @@ if TYPE_CHECKING:
     from ...run.trajectory import Trajectory
 
 
-#: |lambda| T from which the first run is implicit, for an error of _LOOSE, and the power of its
-#: growth for smaller errors: without knowledge of the motions at the start; and with it, in
-#: addition to a factor on the radians of relevant vibration, which grows with the order of implicit
-#: steps.
-_LOOSE, _STIFF_UNKNOWN, _STIFF_UNKNOWN_POWER = 1e-3, 700.0, 0.25
-_STIFF_KNOWN, _STIFF_KNOWN_POWER, _RADIAN_WEIGHT, _RADIAN_WEIGHT_POWER = 450.0, 0.09, 4.5, 0.06
+#: Explicit method for loose tolerances, and exponential method.
+_LOOSE_EXPLICIT, _EXPONENTIAL = "dopri5", "exprb32"
 
-#: Ratio to the target error from which vibration is well above it.
-_WELL_ABOVE = 3.0
-
-#: Explicit method for loose tolerances, and the tolerance down to which it costs less than that of
-#: higher order.  If stability limits the steps, down to the second tolerance, because it damps its
-#: errors at the stability limit: for motions with more than this damping ratio, or of amplitudes
-#: far above the target error.
-_LOOSE_EXPLICIT, _LOW_ORDER_RTOL, _LOW_ORDER_LIMITED_RTOL, _DAMPING_RATIO = (
-    "dopri5",
-    1e-4,
-    1e-6,
-    0.03,
-)
-
-#: Exponential method; smallest target error; steps after which its first run is stopped, constant
-#: and per |lambda| T; largest |lambda| T relative to that for implicit methods.  Second line:
-#: smallest |lambda| T per speed, for an error of _LOOSE, the power of its growth, and the weight of
-#: radians that explicit steps have to resolve more finely.
-(
-    _EXPONENTIAL,
-    _EXPONENTIAL_MIN_ERROR,
-    _EXPONENTIAL_STEPS,
-    _EXPONENTIAL_STEPS_PER_RADIAN,
-    _EXPONENTIAL_MAX_RADIANS,
-) = "exprb32", 1e-6, 15, 1 / 20, 4.0
-_EXPONENTIAL_RADIANS, _EXPONENTIAL_POWER, _RESOLVED_WEIGHT = 250.0, 0.16, 2.0
-
-#: Share of stability-limited steps from which a run counts as limited by stability.
-_LIMITED_SHARE = 0.1
-
-#: Smallest number of steps of an explicit run that may exceed that of an implicit one.
-_STIFF_STEPS = 500
-
-#: Steps after which a first explicit run is stopped, if the method is free, and repeated by `auto`,
-#: which switches methods in stiff scenes.
-_PILOT_STEPS = 3000
-
-#: h |lambda| of explicit steps at the stability limit, and of those that resolve a vibration at a
-#: tolerance, with the order of its decrease.
-_STABLE_STEP, _RESOLVED_STEP, _RESOLVED_RTOL, _RESOLVED_ORDER = 4.0, 0.8, 1e-7, 9.0
-
-#: Factor on the estimated steps of explicit runs, which other kinds predict poorly.
-_UNCERTAINTY = 2.0
-
-#: Cost of a step relative to an explicit one; order of the growth of exponential steps.
-_STEP_COST, _EXPONENTIAL_ORDER = {Kind.IMPLICIT: 2.0, Kind.EXPONENTIAL: 3.0}, 3.0
+#: Cost of a step relative to an explicit one.
+_STEP_COST = {Kind.IMPLICIT: 2.0, Kind.EXPONENTIAL: 3.0}
 
 #: Explicit methods of SciPy and SUNDIALS.
 _EXTERNAL_EXPLICIT = ("scipy-DOP853", "scipy-RK45")
 
-#: Tolerance relative to the target error at which an explicit method is expected to reach it.
-_EXPECTED_RTOL = 1 / 20
-
-#: Largest increase of the frequency of a shape by the free motion of its body.
-_FREE_SHAPE_FACTOR = 8.0
 
 #: Cached results of `_fastest_possible`.
 _fastest_rates: WeakKeyDictionary[CompiledScene, float] = WeakKeyDictionary()
@@ -122,7 +70,7 @@ def is_stability_limited(run: Trajectory) -> bool:
     statistics = run.statistics
     return (
         statistics is not None
-        and statistics.stability_limited_steps > _LIMITED_SHARE * statistics.steps
+        and statistics.stability_limited_steps > TUNING.limited_share * statistics.steps
     )
 
 
@@ -137,7 +85,7 @@ def _fastest_possible(model: CompiledScene) -> float:
         squares = [
             squared_frequencies(body).max(initial=0.0) for body in model.flexible_bodies.values()
         ]
-        shape_rate = _FREE_SHAPE_FACTOR * math.sqrt(max(squares, default=0.0))
+        shape_rate = TUNING.free_shape_factor * math.sqrt(max(squares, default=0.0))
         _fastest_rates[model] = max(shape_rate, fastest_possible(model.scene))
     return _fastest_rates[model]
 
@@ -147,7 +95,7 @@ def _may_be_stiff(run: Trajectory) -> bool:
     statistics = run.statistics
     if run.methods or statistics is None:
         return False
-    return statistics.stability_limited and statistics.steps > _STIFF_STEPS
+    return statistics.stability_limited and statistics.steps > TUNING.stiff_steps
 
 
 class Family:
@@ -160,16 +108,17 @@ class Family:
         self._is_free, self._is_rescued = settings.method == AUTO, False
         self._span, self._uses_exponential = settings.t_end - settings.t_start, False
         self._vibration: Vibration | None = None
-        if not self._is_free or _fastest_possible(model) * self._span <= _STIFF_KNOWN:
+        if not self._is_free or _fastest_possible(model) * self._span <= TUNING.stiff_known:
             return
         try:
             self._vibration = initial_vibration(
-                model, settings.t_start, q, u, self._span, _STIFF_KNOWN
+                model, settings.t_start, q, u, self._span, TUNING.stiff_known
             )
-            minimum = self._threshold(_EXPONENTIAL_RADIANS, _EXPONENTIAL_POWER) * model.nu
-            resolved = self._fastest_radians + _RESOLVED_WEIGHT * self.radians
-            is_short = self._fastest_radians < _EXPONENTIAL_MAX_RADIANS * self._stiff_radians
-            if resolved > minimum and is_short and error >= _EXPONENTIAL_MIN_ERROR:
+            minimum = self._threshold(TUNING.exponential_radians, TUNING.exponential_power)
+            minimum *= model.nu
+            resolved = self._fastest_radians + TUNING.resolved_weight * self.radians
+            is_short = self._fastest_radians < TUNING.exponential_max_radians * self._stiff_radians
+            if resolved > minimum and is_short and error >= TUNING.exponential_min_error:
                 self._uses_exponential = starts_vibrating(model, settings.t_start, q, u)
         except MstmmError:  # no tangent matrix, or an invalid start, which the run reports
             pass
@@ -194,7 +143,8 @@ class Family:
     def radians(self) -> float:
         """Radians of vibration well above the target error that need short steps; 0 if unknown."""
         vibration = self._known_vibration
-        return 0.0 if vibration is None else vibration.demanding_radians(_WELL_ABOVE * self._error)
+        target = TUNING.well_above * self._error
+        return 0.0 if vibration is None else vibration.demanding_radians(target)
 
     def calm(self, run: Trajectory) -> bool:
         """Whether the motions that the steps of a run do not resolve are below the target error."""
@@ -218,7 +168,7 @@ class Family:
         """
         vibration = self._known_vibration
         return vibration is not None and (
-            vibration.fastest_damping > _DAMPING_RATIO or vibration.races(self._error)
+            vibration.fastest_damping > TUNING.damping_ratio or vibration.races(self._error)
         )
 
     @property
@@ -230,13 +180,13 @@ class Family:
     def _stiff_radians(self) -> float:
         """|lambda| T from which implicit steps cost less than explicit ones."""
         if self._known_vibration is None:
-            return self._threshold(_STIFF_UNKNOWN, _STIFF_UNKNOWN_POWER)
-        weight = self._threshold(_RADIAN_WEIGHT, _RADIAN_WEIGHT_POWER)
+            return self._threshold(TUNING.stiff_unknown, TUNING.stiff_unknown_power)
+        weight = self._threshold(TUNING.radian_weight, TUNING.radian_weight_power)
         weighted = weight * self._known_vibration.radians(self._error)
-        return self._threshold(_STIFF_KNOWN, _STIFF_KNOWN_POWER) + weighted
+        return self._threshold(TUNING.stiff_known, TUNING.stiff_known_power) + weighted
 
     def _threshold(self, at_loose: float, power: float) -> float:
-        return at_loose * (_LOOSE / self._error) ** power
+        return at_loose * (TUNING.loose_error / self._error) ** power
 
     def next_kind(self, rtol: float, asked: float, made: Sequence[Trajectory]) -> Kind:
         """Kind of method of the next run after those `made`.
@@ -247,21 +197,21 @@ class Family:
         last, kind = made[-1], run_kind(made[-1])
         if kind is Kind.EXPLICIT or self._keeps_method(made):
             return kind
-        order = get(implicit_method(rtol)).order if kind is Kind.IMPLICIT else _EXPONENTIAL_ORDER
+        order = TUNING.exponential_order
+        if kind is Kind.IMPLICIT:
+            order = get(implicit_method(rtol)).order
         growth = (last.settings.rtol / rtol) ** (1 / order)
         steps = _STEP_COST[kind] * last.statistics.steps * growth
-        explicit_steps = _UNCERTAINTY * self._explicit_steps(_EXPECTED_RTOL * asked, made)
-        return Kind.EXPLICIT if steps >= explicit_steps else kind
+        explicit_steps = self._explicit_steps(TUNING.expected_rtol * asked, made)
+        return Kind.EXPLICIT if steps >= TUNING.uncertainty * explicit_steps else kind
 
     def _explicit_steps(self, rtol: float, made: Sequence[Trajectory]) -> float:
         """Estimated number of explicit steps of a run."""
         rate = max([0.0, *(use.fastest_rate or 0.0 for run in made for use in run.methods)])
         radians = max(self._fastest_radians, rate * self._span)
         resolved = radians if self._vibration is None else self._vibration.radians_above_speed(rtol)
-        return max(
-            radians / _STABLE_STEP,
-            resolved / _RESOLVED_STEP * (_RESOLVED_RTOL / rtol) ** (1 / _RESOLVED_ORDER),
-        )
+        refinement = (TUNING.resolved_rtol / rtol) ** (1 / TUNING.resolved_order)
+        return max(radians / TUNING.stable_step, resolved / TUNING.resolved_step * refinement)
 
     def method(self, kind: Kind, rtol: float, made: Sequence[Trajectory]) -> str:
         """Method of the next run after those `made`, of a given kind and tolerance."""
@@ -276,9 +226,9 @@ class Family:
         prefers_damping = self._prefers_damping
         if not made:
             return _LOOSE_EXPLICIT if prefers_damping else AUTO_EXPLICIT
-        min_rtol = _LOW_ORDER_RTOL
+        min_rtol = TUNING.low_order_rtol
         if prefers_damping and is_stability_limited(made[-1]):
-            min_rtol = _LOW_ORDER_LIMITED_RTOL
+            min_rtol = TUNING.low_order_limited_rtol
         return _LOOSE_EXPLICIT if rtol > min_rtol else AUTO_EXPLICIT
 
     def _keeps_method(self, made: Sequence[Trajectory]) -> bool:
@@ -290,12 +240,13 @@ class Family:
         max_steps, kind = self._settings.max_steps, method_kind(method)
         if not self._is_free or method == AUTO or kind is Kind.IMPLICIT:
             return max_steps
-        limit = int(_EXPONENTIAL_STEPS + _EXPONENTIAL_STEPS_PER_RADIAN * self._fastest_radians)
+        steps = TUNING.exponential_steps_per_radian * self._fastest_radians
+        limit = int(TUNING.exponential_steps + steps)
         if kind is Kind.EXPLICIT:
             expected = (
                 0.0 if self._known_vibration is None else self._explicit_steps(self._error, ())
             )
-            limit = max(_PILOT_STEPS, int(_UNCERTAINTY * expected))
+            limit = max(TUNING.pilot_steps, int(TUNING.uncertainty * expected))
         return min(max_steps or limit, limit)
 
     def rescues(self, lost: Trajectory) -> bool:

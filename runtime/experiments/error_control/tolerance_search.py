@@ -28,7 +28,8 @@ from ...run.error_estimate import compare
 from ...run.run_execution import RunMonitor, first_run, return_start_cache, take_start_cache
 from ..error_measure import Coordinates, Measure, Quantities
 from ..run_request import ErrorRequest
-from ..trial import Setting, Trial, sample_distances
+from ..trial import ATOL_FRACTION, Setting, Trial, sample_distances
+from ..tuning import ERROR_CONTROL as TUNING
 from .error_extrapolation import (
     Kind,
     ToleranceRun,
@@ -45,21 +46,6 @@ if TYPE_CHECKING:
     from ...result.result import Result
     from ...run.trajectory import Trajectory
 
-
-#: Absolute tolerance relative to the relative one.
-_ATOL_PER_RTOL = 0.01
-
-#: Number of samples without given output times; number of samples added for comparison; number of
-#: output times from which none are added.
-_DEFAULT_SAMPLES, _COMPARED_SAMPLES, _SUFFICIENT_SAMPLES = 201, 101, 50
-
-#: Error relative to the sum of local errors: of flexible bodies by the size of their deflections
-#: (m), with an upper bound, and reduced where steps damp errors; and where steps do not resolve the
-#: fastest motions.
-_GROWTH_LENGTH, _MAX_SHAPE_GROWTH, _DAMPED_SHARE, _GROWTH_OF_SPEEDS = 5e-3, 20.0, 0.1, 0.2
-
-#: First step of a run relative to the smallest step of the one before.
-_FIRST_STEP_RATIO = 0.3
 
 Progress = Callable[[float, float], None]
 
@@ -117,7 +103,7 @@ class ToleranceSearch:
 
     def _make_run(self, method: str, rtol: float) -> Trajectory | None:
         """Make one run; return it if it did not reach its end."""
-        rtol, atol = _round_tolerance(rtol), _round_tolerance(_ATOL_PER_RTOL * rtol)
+        rtol, atol = _round_tolerance(rtol), _round_tolerance(ATOL_FRACTION * rtol)
         max_steps = (
             self._settings.max_steps if self._completed else self._family.max_first_steps(method)
         )
@@ -146,7 +132,7 @@ class ToleranceSearch:
         The default may be equal at all tolerances, so that compared runs would share its error.
         """
         statistics = self._completed[-1].trajectory.statistics if self._completed else None
-        return _FIRST_STEP_RATIO * ((statistics and statistics.smallest_step) or 0.0)
+        return TUNING.first_step_ratio * ((statistics and statistics.smallest_step) or 0.0)
 
     def _compared_values(self, run: Trajectory) -> Array:
         """Compared values of a run; for coordinates without creating a result."""
@@ -185,10 +171,10 @@ class ToleranceSearch:
             return None
         if self._model.flexible_bodies and isinstance(self._measure, Coordinates):
             self._measure.set_scales(last.values)
-            growth = min(_GROWTH_LENGTH / self._measure.min_scale, _MAX_SHAPE_GROWTH)
-            return growth * (_DAMPED_SHARE if damps_own_errors(last.trajectory) else 1.0)
+            growth = min(TUNING.growth_length / self._measure.min_scale, TUNING.max_shape_growth)
+            return growth * (TUNING.damped_share if damps_own_errors(last.trajectory) else 1.0)
         is_unresolved = self._family.leaves(last.trajectory) and not self._model.flexible_bodies
-        return _GROWTH_OF_SPEEDS if is_unresolved else None
+        return TUNING.growth_of_speeds if is_unresolved else None
 
     def _distances(self, trial: Trial, tightest: Trial) -> Array:
         """Distances (n,) of a run to the tightest one, relative to the size of the motion.
@@ -329,10 +315,10 @@ def _comparison_times(settings: Settings) -> tuple[float, ...]:
     """Times at which runs are compared: the output times, and more if these are few."""
     start, end, wanted = settings.t_start, settings.t_end, settings.output_times
     if wanted is None:
-        return tuple(np.unique(np.linspace(start, end, _DEFAULT_SAMPLES)).tolist())
-    if len(wanted) >= _SUFFICIENT_SAMPLES:
+        return tuple(np.unique(np.linspace(start, end, TUNING.default_samples)).tolist())
+    if len(wanted) >= TUNING.sufficient_samples:
         return wanted
-    return tuple(np.union1d(wanted, np.linspace(start, end, _COMPARED_SAMPLES)).tolist())
+    return tuple(np.union1d(wanted, np.linspace(start, end, TUNING.compared_samples)).tolist())
 
 
 def _round_tolerance(tolerance: float) -> float:

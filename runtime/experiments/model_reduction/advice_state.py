@@ -19,6 +19,7 @@ from ..error_measure import PositionMeasure
 from ..model_levels import with_model_level
 from ..runs import Runs
 from ..trial import Setting
+from ..tuning import REDUCTION as TUNING
 from .body_models import ErrorPrediction, predict_errors
 from .trial_models import initial_rtol
 
@@ -32,17 +33,6 @@ if TYPE_CHECKING:
     from .body_models import Bodies, BodyModel
     from .trial_models import Renaming, TrialRunner
 
-
-#: Largest error of a model as a fraction of the target error; the rest is for the integration, and
-#: for times between the samples.
-_MODEL_ERROR = 0.9
-
-#: Fraction of the budget for a run with one-way coupling.
-_ONE_WAY_BUDGET = 0.3
-
-#: The error of a split reference is subtracted from the target error if at least this fraction of
-#: the target error remains.
-_MIN_REMAINDER = 0.3
 
 #: Name of the richest model, which all others are compared with.
 RICHEST = "the richest model"
@@ -100,7 +90,7 @@ class AdviceState:
             model = self.compile(with_model_level(scene, "one-way"))
         except (MstmmError, ArithmeticError, np.linalg.LinAlgError):
             return None
-        limit = _ONE_WAY_BUDGET * self.budget.remaining()
+        limit = TUNING.one_way_budget * self.budget.remaining()
         return runs.try_simulate(model, setting.options, limit)[0]
 
     def error_predictions(
@@ -114,7 +104,7 @@ class AdviceState:
         if evidence or not richest.flexible_bodies:
             return evidence, reason
         setting = Setting(AUTO, RICHEST, self.runner.rtol)
-        limit = _ONE_WAY_BUDGET * self.budget.remaining()
+        limit = TUNING.one_way_budget * self.budget.remaining()
         result, failure = self.runner.runs.try_simulate(richest, setting.options, limit)
         if result is None:
             return {}, reason or failure
@@ -130,13 +120,14 @@ class AdviceState:
     @property
     def error_budget(self) -> float:
         """Largest sufficient error of a model relative to the reference."""
-        return _MODEL_ERROR * self.remaining_target
+        return TUNING.model_error * self.remaining_target
 
     @property
     def remaining_target(self) -> float:
         """Target error less the error of the reference, if enough of it remains."""
-        remainder = self.request.error - self.reference_error
-        return remainder if remainder > _MIN_REMAINDER * self.request.error else self.request.error
+        target = self.request.error
+        remainder = target - self.reference_error
+        return remainder if remainder > TUNING.min_remainder * target else target
 
     @property
     def relative_target(self) -> float:

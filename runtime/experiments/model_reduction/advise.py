@@ -15,6 +15,7 @@ from ..error_measure import scene_length_with_ends, select_measure
 from ..model_levels import Variant, model_levels
 from ..runs import Compile, Report
 from ..trial import Setting
+from ..tuning import REDUCTION as TUNING
 from .advice import Advice
 from .advice_state import RICHEST, AdviceState, Request, motion_size
 from .advice_summary import build_advice
@@ -22,7 +23,6 @@ from .beam_splitting import subdivide_beams
 from .body_models import Bodies, ErrorPrediction, predict_errors
 from .method_selection import SelectedSetting, cheapest_setting, whole_run_tolerance
 from .scene_reduction import (
-    SEARCH,
     merge_welded,
     omission_changes,
     reduce_by_halves,
@@ -34,26 +34,6 @@ from .trial_models import Renaming, TrialResult, TrialRunner, choose_window, ini
 
 if TYPE_CHECKING:
     from ..simulation import SimulatedScene
-
-
-#: Largest error of model and integration, as a fraction of the target error; the rest is reserved
-#: for times between the samples.
-_TOTAL_ERROR = 0.95
-
-#: Fraction of the budget for the selection of the method.
-_METHOD_BUDGET = 0.3
-
-#: Number of models for which methods are compared: the one found, and others that suffice and take
-#: at most this many times its CPU time; the second factor holds for errors below this fraction of
-#: the target error.
-_MAX_FINALISTS, _TIME_FACTOR, _ACCURATE_TIME_FACTOR, _ACCURATE = 3, 1.5, 4.0, 0.3
-
-#: Largest error, as a fraction of the target error, for making hinges rigid and for omitting
-#: springs; springs are also omitted if the error grows at most by this factor.
-_RIGID_ERROR, _OMISSION_ERROR, _OMISSION_GROWTH = 0.5, 0.1, 1.1
-
-#: Largest factor on the errors of a window for deflections that grow after it.
-_MAX_RISE = 100.0
 
 
 def make_advice(
@@ -84,7 +64,7 @@ def make_advice(
     state.unsplit_models = Bodies(top.scene).richest
     base, evidence = subdivide_beams(state, base, evidence)
     changes = rigid_hinge_changes(base.scene, richest, q, state.length)
-    max_error = _RIGID_ERROR * request.error
+    max_error = TUNING.rigid_error * request.error
     base = reduce_by_halves(state, base, "rigid", changes, max_error, cheap=True)
     state.runner.names = state.measure.names_of(base.compiled_model)
     return _reduce_bodies(state, base, evidence)
@@ -103,7 +83,7 @@ def _make_runner(
     span = choose_window(model, request.t_end, request.samples, state.budget, state.measure, rtol)
     if not span.is_whole_run:
         rise = max((prediction.rise(span.t_end) for prediction in evidence.values()), default=1.0)
-        span = replace(span, rise=min(rise, _MAX_RISE))
+        span = replace(span, rise=min(rise, TUNING.max_rise))
     runner = TrialRunner(
         span, request.samples, state.budget, state.measure, state.compile, state.report
     )
@@ -126,14 +106,15 @@ def _reduce_bodies(
     state.bodies = Bodies(base.scene)
     search = ModelSearch(
         state.bodies, state.runner, evidence, state.error_budget, state.error_per_metre,
-        lambda: state.budget.remaining(SEARCH) > 0,
+        lambda: state.budget.remaining(TUNING.search_budget) > 0,
     )  # fmt: skip
     for name in (RICHEST, base.name):
         search.choices_by_name[name] = state.bodies.richest
     choices, best = search.run() if state.bodies.richest else ({}, base)
     state.skipped += [f"smaller models of body {name}" for name in search.skipped]
     state.change_texts.setdefault(best.name, state.change_texts[base.name])
-    max_error = max(_OMISSION_ERROR * state.request.error, _OMISSION_GROWTH * best.error)
+    max_error = TUNING.omission_error * state.request.error
+    max_error = max(max_error, TUNING.omission_growth * best.error)
     best = reduce_by_halves(
         state, best, "without", omission_changes(best.scene), max_error, cheap=False
     )
@@ -153,7 +134,7 @@ def _select_setting(
     total.
     """
     available = state.remaining_target
-    if best.error > _ACCURATE * available and choices != state.bodies.richest:
+    if best.error > TUNING.accurate_error * available and choices != state.bodies.richest:
         search.try_choices(search.richer(choices))
     others = sorted(
         (
@@ -165,16 +146,16 @@ def _select_setting(
         key=lambda tried: tried.cpu_s,
     )
     if not state.runner.span.is_whole_run:
-        selected = whole_run_tolerance(best, state, _TOTAL_ERROR * available - best.error)
+        selected = whole_run_tolerance(best, state, TUNING.total_error * available - best.error)
         if selected is not None:
             return selected
         state.notes.append(
             "method and tolerance were selected over the window only: their error after it is "
             "extrapolated"
         )
-    finalists = [best, *others][:_MAX_FINALISTS]
-    seconds = max(_METHOD_BUDGET * state.request.budget, state.budget.remaining())
-    max_error, growth = _TOTAL_ERROR * available, state.runner.span.growth
+    finalists = [best, *others][: TUNING.max_finalists]
+    seconds = max(TUNING.method_budget * state.request.budget, state.budget.remaining())
+    max_error, growth = TUNING.total_error * available, state.runner.span.growth
     try:
         return cheapest_setting(
             finalists,
@@ -190,6 +171,6 @@ def _select_setting(
 
 
 def _may_be_cheapest(state: AdviceState, tried: TrialResult, best: TrialResult) -> bool:
-    is_accurate = tried.error <= _ACCURATE * state.request.error
-    factor = _ACCURATE_TIME_FACTOR if is_accurate else _TIME_FACTOR
+    is_accurate = tried.error <= TUNING.accurate_error * state.request.error
+    factor = TUNING.accurate_time_factor if is_accurate else TUNING.time_factor
     return tried.error <= state.error_budget and tried.cpu_s <= factor * best.cpu_s

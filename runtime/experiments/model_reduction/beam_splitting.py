@@ -17,6 +17,7 @@ from mstmm.scene.tables.beam import GIVEN, ROOT, TIP, Beam, Modes
 from mstmm.scene.tables.flexible_keys import AUTO
 
 from ..model_levels import with_tables
+from ..tuning import REDUCTION as TUNING
 from .body_models import Bodies, ErrorPrediction
 from .scene_edits import unused_name, with_references
 from .trial_models import TrialResult
@@ -200,17 +201,6 @@ def _without_none(value: Any) -> Any:
     return value
 
 
-#: Beams are halved until the result changes by less than this fraction of the target error; the
-#: error of the finer parts is smaller than this change by the second factor.
-_MAX_CHANGE, _ERROR_REDUCTION = 0.5, 4.0
-
-#: Numbers of parts that are tried.
-_COUNTS = (2, 4, 8, 16)
-
-#: Largest error, as a fraction of the target error, of the changes that make a beam splittable.
-_PREPARATION_ERROR = 0.3
-
-
 def subdivide_beams(
     state: AdviceState, base: TrialResult, evidence: dict[str, ErrorPrediction]
 ) -> tuple[TrialResult, dict[str, ErrorPrediction]]:
@@ -234,9 +224,9 @@ def subdivide_beams(
         state.split_error = change if math.isfinite(change) else None
         state.reference_error = 0.0
         return base, evidence
-    remaining = change / _ERROR_REDUCTION
+    remaining = change / TUNING.error_reduction
     state.reference_error += remaining
-    if change > _MAX_CHANGE * state.request.error:
+    if change > TUNING.max_change * state.request.error:
         state.notes.append(
             f"the last halving of beams still changed the result by {change:.1e}; the error "
             f"includes an estimated remainder of {remaining:.1e}"
@@ -256,7 +246,7 @@ def _prepare_splitting(
         return scene, state.runner.finer(scene, state.runner.names, base.name), ()
     run = state.runner.finer(scene, state.runner.names, "splittable beams")
     error = math.inf if run.numbers is None else state.runner.distance(state.runner.reference, run)
-    if error <= _PREPARATION_ERROR * state.request.error:
+    if error <= TUNING.preparation_error * state.request.error:
         state.reference_error = error
         sentences = (
             f'beam "{name}": {change}, which changes the result by {error:.1e}'
@@ -295,14 +285,14 @@ def _refine_parts(
 ) -> tuple[SplitScene, Trial, float]:
     """The scene with beams in enough parts, the finest run, and the change by the last halving."""
     split, change = SplitScene(whole, {}, {}), math.inf
-    for count in _COUNTS if names else ():
+    for count in TUNING.part_counts if names else ():
         parts = split_beams(whole, names, count)
         finer = state.runner.finer(parts.scene, parts.names, f"beams in {count} parts")
         if finer.numbers is None:
             state.notes.append(f"beams in {count} parts could not be simulated: {finer.failure}")
             break
         change = state.runner.distance(run, finer)
-        if change <= _MAX_CHANGE * state.request.error:
+        if change <= TUNING.max_change * state.request.error:
             return split, finer, change
         split, run = parts, finer
     return split, run, change

@@ -20,6 +20,7 @@ from ...result.flexible.model_range import ModelRange
 from ...result.one_way.response import rigidified_bodies
 from ...result.one_way.result import OneWayResult
 from ..model_levels import beam_modes, vibration_mode_count, with_mode_counts, with_tables
+from ..tuning import REDUCTION as TUNING
 
 if TYPE_CHECKING:
     from ...engine.compiled_scene import CompiledScene
@@ -144,11 +145,6 @@ def given_body_model(body: Beam | Elastic, richest: BodyModel) -> BodyModel:
     return BodyModel(STIFFENED if body.stiffening else LINEAR, richest.shapes)
 
 
-#: Error of one-way coupling by recoil and phase, in d chi / (1 - chi); and its largest value, in d:
-#: out of phase, with a recoil as large as the deflection.
-_RECOIL, _MAX_ONE_WAY = 3.0, 2.0
-
-
 @dataclass(frozen=True)
 class ErrorPrediction:
     """Quantities of a run that estimate the errors of the models of one body.
@@ -183,8 +179,8 @@ class ErrorPrediction:
             return d
         shortening = d * self.load_ratio
         if choice.level == ONE_WAY:
-            recoil = _RECOIL * chi / (1 - chi) if chi < 1 else _MAX_ONE_WAY
-            return d * min(recoil, _MAX_ONE_WAY) + shortening
+            recoil = TUNING.recoil * chi / (1 - chi) if chi < 1 else TUNING.max_one_way
+            return d * min(recoil, TUNING.max_one_way) + shortening
         left_out = sum(size for name, size in self.by_shape.items() if not choice.keeps_shape(name))
         return left_out + (shortening if choice.level == LINEAR else 0.0)
 

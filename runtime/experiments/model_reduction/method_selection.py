@@ -17,20 +17,12 @@ from ..method_families import PROMISING
 from ..run_request import ErrorRequest
 from ..runs import Runs
 from ..trial import Setting, max_error
+from ..tuning import REDUCTION as TUNING
 from .scene_edits import rename_reference
 from .trial_models import TrialResult, TrialRunner
 
 if TYPE_CHECKING:
     from .advice_state import AdviceState
-
-
-#: Target error of the integration as a fraction of the error that the model leaves; and fraction of
-#: the target error below which tighter settings are not tried.
-_INTEGRATION_ERROR, _SUFFICIENT_ERROR = 0.5, 0.3
-
-#: Number of settings whose timing is repeated; models count as equally fast up to this ratio of CPU
-#: times, because timings scatter.
-_REPEATED, _EQUAL_TIME_RATIO = 8, 1.15
 
 
 @dataclass(frozen=True)
@@ -66,12 +58,12 @@ def cheapest_setting(
     model_errors = {tried.name: tried.error / bench.span.growth for tried in finalists}
     curves = []
     for tried in finalists:
-        model, enough = tried.compiled_model, _SUFFICIENT_ERROR * target_error
+        model, enough = tried.compiled_model, TUNING.sufficient_error * target_error
         names = bench.measure.names_of(model)
         quantities = tuple(rename_reference(name, names) for name in of)
         model_error = model_errors[tried.name]
         setting = _setting_for_error(
-            tried, runs, quantities, _INTEGRATION_ERROR * (target_error - model_error)
+            tried, runs, quantities, TUNING.integration_error * (target_error - model_error)
         )
         if setting is not None:
             curves.append(Curve(setting.method, tried.name, model, enough, "", iter((setting,))))
@@ -90,16 +82,16 @@ def cheapest_setting(
         raise NumericalFailure(f"no setting reaches an error of {target_error:.1e}")
     smallest_name = finalists[0].name
     order = sorted(sufficient, key=lambda i: points[i].cpu_s or 0.0)
-    fastest, others = order[:_REPEATED], order[_REPEATED:]
+    fastest, others = order[: TUNING.repeated_settings], order[TUNING.repeated_settings :]
     repeated = [*fastest, *(i for i in others if points[i].model == smallest_name)]
-    repeated = repeated[: 2 * _REPEATED]
+    repeated = repeated[: 2 * TUNING.repeated_settings]
     models = [surveyed.models[i] for i in repeated]
     timed, _ = repeat_timings([points[i] for i in repeated], models, rounds, runs, bench.report)
     best = recommend(timed, target_error, reference)
     of_smallest = [point for point in timed if point.model == smallest_name]
     if of_smallest:  # prefer the smallest model unless it is slower
         smallest = recommend(of_smallest, target_error, reference)
-        if (smallest.cpu_s or 0.0) <= _EQUAL_TIME_RATIO * (best.cpu_s or 0.0):
+        if (smallest.cpu_s or 0.0) <= TUNING.equal_time_ratio * (best.cpu_s or 0.0):
             best = smallest
     return SelectedSetting(next(tried for tried in finalists if tried.name == best.model), best)
 
@@ -136,15 +128,6 @@ def compare_cpu_times(
     return first, second
 
 
-#: Smallest fraction of the budget for this search, whatever remains of the budget.
-_MIN_BUDGET = 0.3
-
-#: First tolerance relative to the relative target error, and tightest tolerance; ratio of the
-#: tolerance of the verification; error that the next tolerance aims at, as a fraction of the
-#: allowed error; largest number of tolerances.
-_FIRST, _TIGHTEST, _VERIFICATION_RATIO, _TARGET_FRACTION, _MAX_TRIALS = 0.1, 1e-12, 1e-2, 0.3, 6
-
-
 def whole_run_tolerance(
     best: TrialResult, state: AdviceState, allowed_error: float
 ) -> SelectedSetting | None:
@@ -153,15 +136,15 @@ def whole_run_tolerance(
     None if none is found in time.
     """
     span, measure = state.runner.span, state.measure
-    budget = Budget(
-        max(_MIN_BUDGET * state.request.budget, state.budget.remaining()), state.budget.clock
-    )
+    seconds = max(TUNING.min_whole_run_budget * state.request.budget, state.budget.remaining())
+    budget = Budget(seconds, state.budget.clock)
     times = np.linspace(0.0, span.whole_t_end, state.request.samples)
     runs = Runs(span.whole_t_end, times, budget)
-    rtol = min(max(_FIRST * state.relative_target, _TIGHTEST / _VERIFICATION_RATIO), 1e-3)
-    for _ in range(_MAX_TRIALS):
+    tightest = TUNING.tightest_rtol / TUNING.verification_ratio
+    rtol = min(max(TUNING.first_rtol * state.relative_target, tightest), 1e-3)
+    for _ in range(TUNING.max_whole_run_trials):
         setting = Setting(AUTO, best.name, rtol)
-        tighter = Setting(AUTO, best.name, rtol * _VERIFICATION_RATIO)
+        tighter = Setting(AUTO, best.name, rtol * TUNING.verification_ratio)
         trial = runs.trial(best.compiled_model, setting, measure, budget.remaining() / 3)
         verification = runs.trial(best.compiled_model, tighter, measure, budget.remaining() / 2)
         if trial.numbers is None or verification.numbers is None:
@@ -174,10 +157,8 @@ def whole_run_tolerance(
             return SelectedSetting(
                 best, Point(setting, total_error, trial.cpu_s, 1), covers_whole_run=True
             )
-        if rtol <= _TIGHTEST / _VERIFICATION_RATIO:
+        if rtol <= tightest:
             return None
-        rtol = max(
-            rtol * min(max(_TARGET_FRACTION * allowed_error / error, 1e-4), 0.1),
-            _TIGHTEST / _VERIFICATION_RATIO,
-        )
+        ratio = min(max(TUNING.target_fraction * allowed_error / error, 1e-4), 0.1)
+        rtol = max(rtol * ratio, tightest)
     return None

@@ -18,6 +18,7 @@ from mstmm.scene.tables.hinge import HingeTable
 from mstmm.scene.tables.law import Law
 
 from ..model_levels import Variant, planar_level, with_tables
+from ..tuning import REDUCTION as TUNING
 from .advice_state import AdviceState
 from .scene_edits import (
     ExpandedScene,
@@ -284,16 +285,6 @@ def _zero_law(hinge: HingeTable) -> Law:
     )
 
 
-#: Fraction of the budget after which the search for smaller models ends.
-SEARCH = 0.6
-
-#: Largest error of a planar scene, as a fraction of the target error: its motion must be the same.
-_PLANAR_ERROR = 0.01
-
-#: Changes with an estimated error above this many times the allowed one are not tried.
-_MAX_ESTIMATE = 5.0
-
-
 def reduce_to_plane(
     state: AdviceState, top: Variant, model: SimulatedScene, richest: TrialResult
 ) -> TrialResult:
@@ -304,7 +295,7 @@ def reduce_to_plane(
     if planar is None:
         return richest
     tried = state.runner.run_trial("planar", planar.scene)
-    if tried.error > max(_PLANAR_ERROR * state.request.error, 3 * state.runner.floor):
+    if tried.error > max(TUNING.planar_error * state.request.error, 3 * state.runner.floor):
         return richest
     hinges = [
         f'hinge "{old.name}": {new.type} instead of {old.type}, because the motion is planar'
@@ -333,7 +324,7 @@ def reduce_by_halves(
     names = state.measure.names_of(base.compiled_model)
     kept: list[Change] = []
     best, chain_sentences = base, tuple[str, ...]()
-    limit = _MAX_ESTIMATE * max_error
+    limit = TUNING.max_change_estimate * max_error
     waiting = [
         [
             change
@@ -342,7 +333,7 @@ def reduce_by_halves(
         ]
     ]
     sentences = state.change_texts[base.name]
-    while waiting and state.budget.remaining(SEARCH):
+    while waiting and state.budget.remaining(TUNING.search_budget):
         group = waiting.pop()
         if not group:
             continue
@@ -370,7 +361,7 @@ def _single_change_text(
     state: AdviceState, base: TrialResult, word: str, change: Change, names: Mapping[str, str]
 ) -> str:
     """Description of a change, with its effect alone if there is time for a run."""
-    if not state.budget.remaining(SEARCH):
+    if not state.budget.remaining(TUNING.search_budget):
         return str(change)
     changed = apply_changes(base.scene, [change])
     tried = state.runner.run_trial(

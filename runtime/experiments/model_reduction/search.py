@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 
+from ..tuning import REDUCTION as TUNING
 from .body_models import (
     LINEAR,
     ONE_WAY,
@@ -22,16 +23,6 @@ from .body_models import (
     ErrorPrediction,
 )
 from .trial_models import TrialResult, TrialRunner
-
-#: A model is expected to suffice if its estimated error is below this fraction of the allowed one.
-_SUFFICIENT = 0.5
-
-#: A model is not tried if its estimated error is above this many times the allowed one; the second
-#: limit is for one-way coupling, which takes more time.
-_MAX_ESTIMATE, _MAX_ONE_WAY_ESTIMATE = 50.0, 3.0
-
-#: Bodies get richer models together if their estimates are above this fraction of the largest one.
-_JOINT_FRACTION = 0.1
 
 Choices = dict[str, BodyModel]
 
@@ -105,7 +96,7 @@ class ModelSearch:
 
     def _initial_choice(self, name: str) -> BodyModel:
         """The smallest model that is expected to suffice."""
-        limit = _SUFFICIENT * self.allowed_error / len(self.bodies.richest)
+        limit = TUNING.sufficient_estimate * self.allowed_error / len(self.bodies.richest)
         for choice in self._choices_upward(name):
             estimate = self.expected_error(name, choice)
             if estimate is not None and estimate <= limit and self._is_valid(name, choice):
@@ -166,7 +157,7 @@ class ModelSearch:
         max_error = max(errors.values())
         richer = dict(choices)
         for name, error in errors.items():
-            if error >= _JOINT_FRACTION * max_error:
+            if error >= TUNING.joint_fraction * max_error:
                 richer[name] = self._next_choice(name, choices[name])
         return richer
 
@@ -176,8 +167,8 @@ class ModelSearch:
         current = self.expected_error(name, choice)
         for model in models[models.index(choice) + 1 :] if choice in models else ():
             estimate = self.expected_error(name, model)
-            is_smaller = estimate is None or current is None or estimate < _SUFFICIENT * current
-            if is_smaller and self._is_valid(name, model):
+            limit = math.inf if current is None else TUNING.sufficient_estimate * current
+            if (estimate is None or estimate < limit) and self._is_valid(name, model):
                 return model
         return self.bodies.richest[name]
 
@@ -206,7 +197,7 @@ class ModelSearch:
 
     def _is_promising(self, name: str, choice: BodyModel) -> bool:
         estimate = self.expected_error(name, choice)
-        factor = _MAX_ONE_WAY_ESTIMATE if choice.level == ONE_WAY else _MAX_ESTIMATE
+        factor = TUNING.max_one_way_estimate if choice.level == ONE_WAY else TUNING.max_estimate
         return estimate is None or estimate <= factor * self.allowed_error
 
     def _smaller_choices(self, name: str, choice: BodyModel) -> Iterator[BodyModel]:

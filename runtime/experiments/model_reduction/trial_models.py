@@ -19,6 +19,7 @@ from ..budget import Budget
 from ..error_measure import Measure
 from ..runs import Compile, Report, Runs
 from ..trial import Setting, Trial, max_error
+from ..tuning import REDUCTION as TUNING
 from .scene_edits import rename_reference
 
 if TYPE_CHECKING:
@@ -26,28 +27,6 @@ if TYPE_CHECKING:
     from ...result.quantity_names import Quantity
     from ...result.result_record import Record
     from ..simulation import SimulatedScene
-
-
-#: Relative tolerance of trial runs as a fraction of the relative target error, and its bounds.
-_RTOL_FRACTION, _LOOSEST, _TIGHTEST = 1e-3, 1e-6, 1e-12
-
-#: Ratio of the tolerance of the reference to that of trial runs, and largest difference of the two
-#: runs as a fraction of the target error.
-_REFERENCE_RATIO, _MAX_DIFFERENCE = 1e-2, 0.05
-
-#: Fraction of the run that is simulated to estimate its CPU time.
-_PROBE_FRACTION = 1 / 20
-
-#: Fractions of the budget: for runs of the reference over the whole run, for those over a window,
-#: and for the run of one model.
-_REFERENCE_BUDGET, _WINDOW_BUDGET, _MODEL_BUDGET = 0.35, 0.1, 0.2
-
-#: Runs shorter than this (s) are repeated this many times; the smallest time counts.
-_SHORT, _REPEATS = 0.03, 3
-
-#: Models count as equally fast up to this ratio of CPU times, because timings scatter; runs below
-#: the second number (s) are timed again up to this many times if a model seems slower.
-_EQUAL_TIME_RATIO, _RETIMED_BELOW, _RETIMINGS = 1.15, 0.5, 5
 
 
 @dataclass(frozen=True)
@@ -115,23 +94,24 @@ def choose_window(
 
     Raises NumericalFailure if the model cannot be simulated.
     """
-    runs = Runs(_PROBE_FRACTION * t_end, np.linspace(0.0, _PROBE_FRACTION * t_end, samples), budget)
-    limit = budget.remaining() * _REFERENCE_BUDGET
+    probe_end = TUNING.probe_fraction * t_end
+    runs = Runs(probe_end, np.linspace(0.0, probe_end, samples), budget)
+    limit = budget.remaining() * TUNING.reference_budget
     begin = budget.clock()
     trial = runs.trial(model, Setting(AUTO, "", rtol), measure, limit)
     spent = max(budget.clock() - begin, 1e-9)
     if trial.late:
         raise NumericalFailure(
-            f"the richest model needs more than {limit:.3g} s for {_PROBE_FRACTION * t_end:.3g} s, "
+            f"the richest model needs more than {limit:.3g} s for {probe_end:.3g} s, "
             "a twentieth of the run; give a larger --budget or an earlier end time"
         )
     if trial.numbers is None:
         raise NumericalFailure(trial.failure)
-    cost = 3.0 * spent / _PROBE_FRACTION  # two runs, one of them tighter
-    if cost <= _REFERENCE_BUDGET * budget.remaining():
+    cost = 3.0 * spent / TUNING.probe_fraction  # two runs, one of them tighter
+    if cost <= TUNING.reference_budget * budget.remaining():
         return ComparisonWindow(t_end, t_end)
-    fraction = _WINDOW_BUDGET * budget.remaining() / cost
-    return ComparisonWindow(max(min(fraction, 1.0), _PROBE_FRACTION) * t_end, t_end)
+    fraction = TUNING.window_budget * budget.remaining() / cost
+    return ComparisonWindow(max(min(fraction, 1.0), TUNING.probe_fraction) * t_end, t_end)
 
 
 class TrialRunner:
@@ -163,7 +143,7 @@ class TrialRunner:
         self.span, self.measure, self.budget = span, measure, budget
         self.runs = Runs(span.t_end, np.linspace(0.0, span.t_end, samples), budget)
         self.compile, self.report = compile, tell
-        self.rtol = _LOOSEST
+        self.rtol = TUNING.loosest_rtol
         self.names: Mapping[str, str] = {}
         self.reference: Trial
         self.floor = 0.0
@@ -181,13 +161,13 @@ class TrialRunner:
         self.rtol = initial_rtol(part)
         run = self._run_richest(model, name, self.rtol)
         while True:
-            tighter_rtol = max(self.rtol * _REFERENCE_RATIO, _TIGHTEST)
+            tighter_rtol = max(self.rtol * TUNING.reference_ratio, TUNING.tightest_rtol)
             tighter = self._run_richest(model, name, tighter_rtol)
             self.measure.set_scales(tighter.values)
             difference = self.distance(run, tighter)
-            if difference <= _MAX_DIFFERENCE * asked:
+            if difference <= TUNING.max_difference * asked:
                 break
-            if tighter_rtol <= _TIGHTEST:
+            if tighter_rtol <= TUNING.tightest_rtol:
                 raise NumericalFailure(
                     f"two runs of the richest model with rtol {self.rtol:.0e} and "
                     f"{tighter_rtol:.0e} differ by {difference:.1e}: an error of {asked:.1e} "
@@ -207,7 +187,7 @@ class TrialRunner:
         self.report(name)
         model = self.compile(scene)
         self.measure.register(model, names)
-        limit = self.budget.remaining() * _MODEL_BUDGET
+        limit = self.budget.remaining() * TUNING.model_budget
         return self.runs.trial(model, Setting(AUTO, name, self.rtol), self.measure, limit)
 
     def distance(self, a: Trial, b: Trial) -> float:
@@ -248,7 +228,7 @@ class TrialRunner:
             self.measure.register(model, self.names if names is None else names, still)
         except MstmmError as problem:
             return TrialResult(name, scene, None, math.inf, math.inf, str(problem))
-        limit = self.budget.remaining() * _MODEL_BUDGET
+        limit = self.budget.remaining() * TUNING.model_budget
         trial = self.runs.trial(model, Setting(AUTO, name, self.rtol), self.measure, limit)
         if trial.late:
             self.late.append(name)
@@ -268,9 +248,9 @@ class TrialRunner:
 
     def _min_cpu_s(self, model: SimulatedScene, trial: Trial) -> float:
         """CPU time of a run, s; for a short run the smallest of several."""
-        if trial.cpu_s >= _SHORT:
+        if trial.cpu_s >= TUNING.short_run:
             return trial.cpu_s
-        again = self.runs.cpu_s(model, trial.setting, self.budget.remaining(), _REPEATS - 1)
+        again = self.runs.cpu_s(model, trial.setting, self.budget.remaining(), TUNING.repeats - 1)
         return trial.cpu_s if again is None else min(trial.cpu_s, again)
 
     def is_as_cheap(self, one: TrialResult, other: TrialResult) -> bool:
@@ -279,8 +259,9 @@ class TrialRunner:
         If it seems slower, both are timed again in turn: other processes may have delayed it.
         """
         pair, times = (one, other), [one.cpu_s, other.cpu_s]
-        for _ in range(_RETIMINGS):
-            if times[0] <= _EQUAL_TIME_RATIO * times[1] or not max(times) < _RETIMED_BELOW:
+        for _ in range(TUNING.retimings):
+            is_as_cheap = times[0] <= TUNING.equal_time_ratio * times[1]
+            if is_as_cheap or not max(times) < TUNING.retimed_below:
                 break
             for k, tried in enumerate(pair):
                 setting = Setting(AUTO, tried.name, self.rtol)
@@ -288,11 +269,11 @@ class TrialRunner:
                 if spent is None:
                     return False
                 times[k] = min(times[k], spent)
-        return times[0] <= _EQUAL_TIME_RATIO * times[1]
+        return times[0] <= TUNING.equal_time_ratio * times[1]
 
     def _run_richest(self, model: SimulatedScene, name: str, rtol: float) -> Trial:
         """Run the richest model; NumericalFailure if the run fails."""
-        limit = self.budget.remaining() * 2 * _REFERENCE_BUDGET
+        limit = self.budget.remaining() * 2 * TUNING.reference_budget
         self.report(f"{name}, rtol {rtol:.0e}")
         trial = self.runs.trial(model, Setting(AUTO, name, rtol), self.measure, limit)
         if trial.numbers is None:
@@ -303,7 +284,7 @@ class TrialRunner:
 
 def initial_rtol(part: float) -> float:
     """First relative tolerance for a target error relative to the size of the motion."""
-    return min(max(_RTOL_FRACTION * part, 100 * _TIGHTEST), _LOOSEST)
+    return min(max(TUNING.rtol_fraction * part, 100 * TUNING.tightest_rtol), TUNING.loosest_rtol)
 
 
 # --- measure of models in which bodies and ends have other names ----------------------------------

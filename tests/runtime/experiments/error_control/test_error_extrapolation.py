@@ -8,7 +8,6 @@ from collections.abc import Callable
 import pytest
 
 from mstmm.runtime.experiments.error_control.error_extrapolation import (
-    RUNS,
     TIGHTEST,
     Kind,
     ToleranceRun,
@@ -17,6 +16,7 @@ from mstmm.runtime.experiments.error_control.error_extrapolation import (
     next_rtol,
     no_gain_reason,
 )
+from mstmm.runtime.experiments.tuning import ERROR_CONTROL
 
 
 def looks(
@@ -76,7 +76,7 @@ def test_motion_that_cannot_be_told_ends_at_the_tightest_tolerance() -> None:
     while not no_gain_reason(found := looks(lambda rtol: 1.0 + 0.3 * math.sin(1 / rtol), *rtols)):
         rtols.append(next_rtol(found, 1e-6, kind=Kind.EXPLICIT))
     assert rtols[-1] == TIGHTEST
-    assert len(rtols) < RUNS
+    assert len(rtols) < ERROR_CONTROL.max_runs
 
 
 @pytest.mark.parametrize(("kind", "leap"), [(Kind.EXPLICIT, 1e-2), (Kind.IMPLICIT, 1e-1)])

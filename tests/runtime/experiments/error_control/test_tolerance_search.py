@@ -16,6 +16,7 @@ from scipy.special import ellipj, ellipk
 import mstmm
 from mstmm.runtime.experiments.error_control import method_choice, tolerance_search
 from mstmm.runtime.experiments.error_control.initial_vibration import starts_vibrating
+from mstmm.runtime.experiments.tuning import ERROR_CONTROL
 from mstmm.runtime.integrate.c_loop import Statistics, Status
 from mstmm.runtime.integrate.settings import Settings
 from mstmm.runtime.result.export.provenance import file_attributes
@@ -170,8 +171,8 @@ def test_a_beam_that_nothing_shakes_is_followed_by_others() -> None:
 def test_an_exponential_run_that_takes_too_many_steps_is_given_up(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(method_choice, "_EXPONENTIAL_STEPS", 2)
-    monkeypatch.setattr(method_choice, "_EXPONENTIAL_STEPS_PER_RADIAN", 0.0)
+    few = replace(ERROR_CONTROL, exponential_steps=2, exponential_steps_per_radian=0.0)
+    monkeypatch.setattr(method_choice, "TUNING", few)
     known = boom(5.0).simulate(2.0, error=1e-3).achieved_error
     assert known is not None and known.is_met
     assert [one.method for one in known.runs if one.failure] == ["exprb32"]
@@ -299,7 +300,7 @@ def test_an_implicit_run_that_finds_no_step_gives_way(monkeypatch: pytest.Monkey
 def test_a_first_run_that_takes_too_many_steps_is_given_up_to_auto(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(method_choice, "_PILOT_STEPS", 10)
+    monkeypatch.setattr(method_choice, "TUNING", replace(ERROR_CONTROL, pilot_steps=10))
     run = pendulums(2, 2.0).simulate(4.0, error=1e-5)
     known = run.achieved_error
     assert known is not None and known.is_met

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from mstmm.runtime.experiments.model_reduction import (
 )
 from mstmm.runtime.experiments.model_reduction.advice import BodyAdvice
 from mstmm.runtime.experiments.model_reduction.body_models import RIGID, BodyModel
+from mstmm.runtime.experiments.tuning import REDUCTION
 from tests.support.scenes.advice import sprung_rods, tip
 
 OF = "d.tip.position"
@@ -112,7 +114,7 @@ def test_what_the_budget_leaves_no_time_for_is_named(monkeypatch: pytest.MonkeyP
     assert small.scene == large.scene
     assert not any("limits this advice" in note for note in (*small.notes, *large.notes))
     for module in (advise, scene_reduction):
-        monkeypatch.setattr(module, "SEARCH", 0.0)
+        monkeypatch.setattr(module, "TUNING", replace(REDUCTION, search_budget=0.0))
     made = mstmm.advise(scene, 1.0, error=1e-2, of=OF, rounds=0, budget=600)
     note = next(note for note in made.notes if "limits this advice" in note)
     assert "600 s" in note and "spring" in note and "not examined" in note
