@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
     from ..derive.fuse.scene_kernels import FusedSceneIR
     from ..runtime.linear.linear_equations import LinearEquations
-    from ..runtime.linear.symbolic_matrices import SymbolicLinearModel
+    from ..runtime.linear.mck_matrices import SymbolicLinearModel
     from ..runtime.packing.packed_scene import PackedScene
     from ..runtime.packing.system import System
 

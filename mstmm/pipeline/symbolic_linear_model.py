@@ -25,7 +25,7 @@ from ..numerics.piecewise_polynomial import NUMBERS_PER_PIECE
 from ..numerics.symbolic_number import Formula, SymbolTable, factor_of_symbol, formula
 from ..runtime.linear.frozen_loads import INERTIAL
 from ..runtime.linear.input_channels import Channel
-from ..runtime.linear.symbolic_matrices import SymbolicLinearModel
+from ..runtime.linear.mck_matrices import SymbolicLinearModel
 from ..runtime.packing.expression_tapes import MOVING, state_ports
 from ..runtime.packing.fused_structure import structure_and_numbers
 from ..runtime.packing.parameter_derivatives import reject_folded_parameters, seed_derivatives

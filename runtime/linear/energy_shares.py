@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from mstmm.array_validation import Array
 
 from .frozen_loads import with_frozen_springs, without_laws
-from .matrix_operators import Pencil
+from .mck_matrices import Pencil
 
 if TYPE_CHECKING:
     from ..engine.compiled_scene import CompiledScene

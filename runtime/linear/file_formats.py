@@ -12,6 +12,7 @@ import numpy as np
 from mstmm.array_validation import Array
 from mstmm.errors import SceneError
 from mstmm.optional_packages import missing_package_error
+from mstmm.risk import AssessedResult
 
 from ..platform_support.safe_files import replace_atomically, require_path, seal
 
@@ -107,6 +108,23 @@ def save(given: str | Path, dataset: Callable[[], Any], rows: Iterator[tuple[str
             with temporary.open("w", newline="", encoding="utf-8") as file:
                 csv.writer(file).writerows(rows)
     return path
+
+
+class SavedResult(AssessedResult):
+    """Base of results that are saved as a data set (`to_xarray`) or as a table (`_rows`)."""
+
+    def to_xarray(self) -> Any:
+        raise NotImplementedError
+
+    def _rows(self) -> Iterator[tuple[str, ...]]:
+        raise NotImplementedError
+
+    def save(self, path: str | Path) -> Path:
+        """Save the result: .nc (extra io), or .csv with one row per value, frequency or mode.
+
+        Raises SceneError for another file extension, EnvironmentFailure without the extra.
+        """
+        return save(path, self.to_xarray, self._rows())
 
 
 def xarray() -> Any:

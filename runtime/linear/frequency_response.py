@@ -18,17 +18,21 @@ from numpy.typing import ArrayLike, NDArray
 
 from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure, SceneError
-from mstmm.risk import AssessedResult, DeferredRisks, Risk
+from mstmm.risk import DeferredRisks, Risk
 
 from ..engine.compiled_scene import speed_scales
 from ..engine.tangent_matrix import HarmonicResponse
 from ..result.checks.shape_range import response_range_risks
-from . import file_formats
-from .harmonic.damping_checks import (
+from .file_formats import SavedResult, xarray
+from .harmonic.damping import (
+    Losses,
+    Ratios,
     check_state_at_rest,
     is_requested,
+    modal_damping,
     reject_drives,
     reject_modal_damping,
+    stiffer,
 )
 from .harmonic.exact_beams import (
     BeamSelection,
@@ -37,12 +41,13 @@ from .harmonic.exact_beams import (
     reject_distributed,
     reject_inner_names,
 )
-from .harmonic.harmonic_solve import Amplitudes
-from .harmonic.hysteretic_damping import Losses, stiffer
-from .harmonic.modal_damping import Ratios, modal_damping
-from .harmonic.steady_states import check_steady, find_time_risks, reject_rotating_balls
-from .harmonic.unshaped_response import unshaped_response_risks
-from .harmonic_loads import HarmonicLoads
+from .harmonic.harmonic_solve import Amplitudes, HarmonicLoads
+from .harmonic.response_risks import (
+    check_steady,
+    find_time_risks,
+    reject_rotating_balls,
+    unshaped_response_risks,
+)
 from .input_channels import Channel, channel, some_names
 from .mck_matrices import Matrices
 from .outputs.linear_outputs import outputs_of, read_by, rows_of
@@ -72,7 +77,7 @@ _FASTEST = 1e100
 
 
 @dataclass(frozen=True, eq=False)
-class FrequencyResponse(AssessedResult):
+class FrequencyResponse(SavedResult):
     """Amplitudes of outputs under inputs cos(omega t) of unit amplitude.
 
     Attributes:
@@ -154,7 +159,7 @@ class FrequencyResponse(AssessedResult):
             "omega": ("omega", self.omega, {"units": "rad/s"}),
             "output": list(self.output_names), "input": list(self.input_names),
         }  # fmt: skip
-        return file_formats.xarray().Dataset(arrays, coords)
+        return xarray().Dataset(arrays, coords)
 
     def _rows(self) -> Iterator[tuple[str, ...]]:
         """Header, then one row per frequency."""
@@ -164,13 +169,6 @@ class FrequencyResponse(AssessedResult):
         for omega, row in zip(self.omega.tolist(), curves, strict=True):
             numbers = [x for value in row for x in (abs(value), np.angle(value))]
             yield tuple(repr(float(x)) for x in (omega, omega / (2 * np.pi), *numbers))
-
-    def save(self, path: str | Path) -> Path:
-        """Save the response: .nc (extra io), or .csv with one row per frequency.
-
-        Raises SceneError for another file extension, EnvironmentFailure without the extra.
-        """
-        return file_formats.save(path, self.to_xarray, self._rows())
 
 
 def frequency_response(

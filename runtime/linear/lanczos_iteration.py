@@ -15,7 +15,7 @@ from scipy.linalg import eigh_tridiagonal
 from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure
 
-from .matrix_operators import Pencil
+from .mck_matrices import Pencil
 
 #: Largest residual of a converged mode, relative to 1/(omega^2 - sigma).
 _CLOSE = 1e-9

@@ -17,20 +17,17 @@ from mstmm.risk import AssessedResult
 
 from ..packing.coordinate_layout import check_dense_size
 from ..run.scene_system import SceneSystem
-from .drive_inputs import Columns, DriveFactors, coordinate, drive_columns
+from .constrained_linearisation import ConstrainedLinearisation
 from .frozen_loads import with_frozen_loads, with_frozen_springs, without_laws
-from .input_channels import Channel, columns
-from .loops.constrained_linearisation import ConstrainedLinearisation
-from .matrix_operators import Pencil
-from .mck_matrices import Matrices, State, matrices
+from .input_channels import Channel, Columns, DriveFactors, columns, coordinate, drive_columns
+from .mck_matrices import FrameTransform, Matrices, Pencil, State, matrices
 from .operating_point.friction import DryFriction
-from .rotors.frame_transform import FrameTransform
 
 if TYPE_CHECKING:
     from ..engine.compiled_derivatives import CompiledState
     from ..engine.compiled_scene import CompiledScene
     from ..engine.looped_engine import LoopedEngine
-    from .symbolic_matrices import SymbolicLinearModel
+    from .mck_matrices import SymbolicLinearModel
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,17 +15,20 @@ from mstmm.argument_validation import abbreviate
 from mstmm.array_validation import Array
 from mstmm.display import PublicMembers
 from mstmm.errors import SceneError
+from mstmm.optional_packages import missing_package_error
 from mstmm.risk import Risk
 
 from ..packing.coordinate_layout import check_dense_size
 from .frequency_response import FrequencyResponse, frequency_response
+from .harmonic.damping import Losses, Ratios
 from .harmonic.dynamic_stiffness_modes import DynamicStiffnessModes, exact_modes
 from .harmonic.exact_beams import BeamSelection
-from .harmonic.hysteretic_damping import Losses
-from .harmonic.modal_damping import Ratios
+from .harmonic.response_risks import check_steady_outputs
+from .input_channels import Channel, some_names
 from .mode_solvers import modes
 from .modes import Modes
-from .rotors.fixed_frame import fixed_frame_transform, frame_of
+from .outputs.linear_outputs import outputs_of, rows_of
+from .rotors import fixed_frame_transform, frame_of
 from .state_space import StateSpace
 from .validity import find_linear_risks
 
@@ -156,9 +159,7 @@ class Linear(PublicMembers, StateSpace):
 
         `outputs` are as in `frequency_response`.
         """
-        from .python_control import output_matrices
-
-        return output_matrices(self, outputs, self.input_channels, self.B)[1:]
+        return _output_matrices(self, outputs, self.input_channels, self.B)[1:]
 
     def to_control(self, outputs: Sequence[str] | None = None, disturbances: bool = False) -> Any:
         """Model as a `control.StateSpace` of python-control (extra control).
@@ -170,9 +171,7 @@ class Linear(PublicMembers, StateSpace):
         Raises SceneError without inputs or for an unknown output, EnvironmentFailure without the
         extra.
         """
-        from .python_control import to_control
-
-        return to_control(self, outputs, disturbances)
+        return _to_control(self, outputs, disturbances)
 
     def plot(self, path: str | Path | None = None) -> Any:
         """Maps of M, C and K as a `matplotlib.figure.Figure`, written to `path` if given.
@@ -201,3 +200,45 @@ class Linear(PublicMembers, StateSpace):
         from .file_formats import dataset, entries, save
 
         return save(path, lambda: dataset(self), entries(self))
+
+
+# --- output matrices and python-control -----------------------------------------------------------
+
+
+def _output_matrices(
+    linear: StateSpace, outputs: Sequence[str] | None, pushes: Sequence[Channel], b: Array
+) -> tuple[tuple[str, ...], Array, Array]:
+    """Output names, C (outputs, states) and D (outputs, pushes) of y = C z + D v.
+
+    `b` (states, pushes) is the input matrix of d/dt z.
+    """
+    named = None if outputs is None else some_names("outputs", outputs)
+    shown = outputs_of(linear, named)
+    check_steady_outputs(linear, shown)
+    c, d = linear.state_output_matrices(rows_of(linear, shown, pushes), b)
+    return tuple(quantity.name for quantity in shown), c, d
+
+
+def _to_control(linear: StateSpace, outputs: Sequence[str] | None, disturbances: bool) -> Any:
+    """Model as a `control.StateSpace`; see `Linear.to_control`."""
+    try:
+        import control
+    except ImportError as error:
+        raise missing_package_error("control", "a system for python-control", error) from None
+    b, pushes = linear.B, linear.input_channels
+    if disturbances:
+        b, pushes = np.hstack([b, linear.B_disturbances]), (*pushes, *linear.disturbance_channels)
+    if not pushes:
+        raise SceneError(
+            'the model has no inputs; give inputs, as in linearize(inputs=["shoulder.effort"])'
+        )
+    names, c, d = _output_matrices(linear, outputs, pushes, b)
+    return control.ss(
+        linear.A, b, c, d, states=list(map(_signal, linear.state_names)),
+        inputs=[_signal(entry.name) for entry in pushes], outputs=list(map(_signal, names)),
+    )  # fmt: skip
+
+
+def _signal(name: str) -> str:
+    """Signal name without dots, which separate system and signal names in python-control."""
+    return name.replace(".", "_").replace("[", "_").replace("]", "")

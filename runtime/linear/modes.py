@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 from mstmm.array_validation import Array, finite_float
 from mstmm.display import PublicMembers, abbreviate_names
 from mstmm.errors import SceneError
-from mstmm.risk import AssessedResult, Risk, information
+from mstmm.risk import Risk, information
 
 from ..engine.compiled_scene import scene_length
 from ..result.checks.shape_range import motion_range_risks, shape_limits
-from . import energy_shares, file_formats
-from .rotors.displacements import whirl
-from .rotors.fixed_frame import frame_of
+from . import energy_shares
+from .file_formats import SavedResult, xarray
+from .rotors import frame_of, whirl
 
 if TYPE_CHECKING:
     from ..result.scene3d.view import SceneView
@@ -36,7 +36,7 @@ Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, eq=False)
-class Modes(PublicMembers, AssessedResult):
+class Modes(PublicMembers, SavedResult):
     """k modes x(t) = Re(shape exp(eigenvalue t)) about an operating point, by ascending omega.
 
     Attributes:
@@ -267,7 +267,7 @@ class Modes(PublicMembers, AssessedResult):
             "body": list(kinetic), "owner": list(strain),
         }  # fmt: skip
         about = {"complete": str(self.is_complete), "frame": self.frame}
-        return file_formats.xarray().Dataset(arrays, names, about)
+        return xarray().Dataset(arrays, names, about)
 
     def _rows(self) -> Iterator[tuple[str, ...]]:
         """Header, then one row per mode."""
@@ -285,15 +285,6 @@ class Modes(PublicMembers, AssessedResult):
             numbers = [*(x[k] for x in about), *(x for part in parts for x in part(shape)),
                        *(row[k] for _, part in whose for row in part.values())]  # fmt: skip
             yield str(k + 1), *(repr(float(x)) for x in numbers)
-
-    def save(self, path: str | Path) -> Path:
-        """Save frequencies, damping, shapes and energy shares: .nc (extra io) or .csv.
-
-        The .csv file has one row per mode.
-
-        Raises SceneError for another file extension, EnvironmentFailure without the extra.
-        """
-        return file_formats.save(path, self.to_xarray, self._rows())
 
     def plot(self, path: str | Path | None = None, which: Sequence[int] | None = None) -> Any:
         """Mode shapes as a `matplotlib.figure.Figure`, written to `path` if given.

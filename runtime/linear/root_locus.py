@@ -22,7 +22,7 @@ from mstmm.errors import NumericalFailure, SceneError
 from mstmm.risk import RUN, AssessedResult, DeferredRisks, Risk
 
 from ..result.checks.answer_checks import merge_over_values
-from . import file_formats
+from .file_formats import SavedResult, xarray
 from .modes import Complex, Modes
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ _ALIKE = 1.02
 
 
 @dataclass(frozen=True, eq=False)
-class RootLocus(AssessedResult):
+class RootLocus(SavedResult):
     """Eigenvalues over a parameter.
 
     Attributes:
@@ -107,7 +107,7 @@ class RootLocus(AssessedResult):
             "motion": np.arange(1, self.eigenvalues.shape[1] + 1),
         }
         about = {"parameter": self.parameter_name, "frame": self.frame}
-        return file_formats.xarray().Dataset(arrays, coords, about)
+        return xarray().Dataset(arrays, coords, about)
 
     def _rows(self) -> Iterator[tuple[str, ...]]:
         """Header, then one row per parameter value."""
@@ -121,13 +121,6 @@ class RootLocus(AssessedResult):
         )
         for value, row in zip(self.parameter_values.tolist(), pairs.tolist(), strict=True):
             yield tuple(map(repr, (value, *row)))
-
-    def save(self, path: str | Path) -> Path:
-        """Save frequencies and growth: .nc (extra io), or .csv with one row per parameter value.
-
-        Raises SceneError for another file extension, EnvironmentFailure without the extra.
-        """
-        return file_formats.save(path, self.to_xarray, self._rows())
 
 
 def trace_modes(

@@ -16,13 +16,16 @@ from ..result.checks.answer_checks import find_state_risks
 from .input_channels import GROUND, Channel
 from .mode_solvers import modes
 from .modes import INPUT_RISKS, OUTPUT_LEFT_OUT
-from .operating_point.changes import MATRICES, find_changes
-from .operating_point.departure import LARGEST, Departure, find_departure
-from .operating_point.friction_risks import friction_risks, independent_motions, saturation_risks
-from .operating_point.initial_speeds import find_start_risks
+from .operating_point.departure import LARGEST, MATRICES, Departure, find_changes, find_departure
 from .operating_point.later_states import LaterStates
+from .operating_point.omitted_effects import (
+    find_start_risks,
+    friction_risks,
+    independent_motions,
+    saturation_risks,
+)
 from .outputs.linear_outputs import unavailable_outputs
-from .rotors.blades import find_blades
+from .rotors import find_blades
 
 if TYPE_CHECKING:
     from .linear_equations import LinearEquations

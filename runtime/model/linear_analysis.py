@@ -15,16 +15,14 @@ from .state_dynamics import DynamicsQueries
 
 if TYPE_CHECKING:
     from ..linear.frequency_response import FrequencyResponse
+    from ..linear.harmonic.damping import Losses, Ratios
     from ..linear.harmonic.dynamic_stiffness_modes import DynamicStiffnessModes
     from ..linear.harmonic.exact_beams import BeamSelection
-    from ..linear.harmonic.hysteretic_damping import Losses
-    from ..linear.harmonic.modal_damping import Ratios
     from ..linear.linear_model import Linear
     from ..linear.modes import Modes
     from ..linear.operating_point.friction import Amplitudes
+    from ..linear.parameter_sweeps import UnbalanceResponse, Waterfall
     from ..linear.root_locus import RootLocus, StabilityLimit
-    from ..linear.rotors.unbalance import UnbalanceResponse
-    from ..linear.waterfall import Waterfall
     from .linearisation import Lineariser
 
 
@@ -154,7 +152,7 @@ class LinearAnalysis(DynamicsQueries):
         self, parameter: str, values: ArrayLike, omega: ArrayLike, input: str, output: str
     ) -> Waterfall:
         """Frequency response of one output to one input over a parameter and omega (rad/s)."""
-        from ..linear.waterfall import waterfall
+        from ..linear.parameter_sweeps import waterfall
 
         points = one_row("values", values)
         model_at = self._linear_model_at(parameter)
@@ -176,7 +174,7 @@ class LinearAnalysis(DynamicsQueries):
         SceneError for unknown names and rotors that are not axisymmetric, NumericalFailure at a
         critical speed without damping.
         """
-        from ..linear.rotors.unbalance import unbalance_response
+        from ..linear.parameter_sweeps import unbalance_response
 
         observed = [at] if points is None else some_names("points", points)
         speeds = one_row("values", values)

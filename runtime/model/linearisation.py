@@ -13,12 +13,12 @@ from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure
 
 from ..engine.compiled_scene import speed_scales
+from ..linear.constrained_linearisation import mechanism_at, mechanism_in_motion
 from ..linear.input_channels import GROUND, Channel, input_channels, inputs_of
 from ..linear.linear_model import Linear
-from ..linear.loops.constrained_linearisation import mechanism_at, mechanism_in_motion
 from ..linear.mck_matrices import State, matrices
-from ..linear.nonholonomic.admissible_perturbations import has_speed_rows
-from ..linear.nonholonomic.linear_model import nonholonomic_at
+from ..linear.nonholonomic_model import nonholonomic_at
+from ..linear.nonholonomic_perturbations import has_speed_rows
 from ..linear.operating_point.friction import Amplitudes, dry_friction
 from ..linear.validity import is_unsteady
 from ..run.scene_system import SceneSystem

@@ -12,7 +12,7 @@ from ...array_validation import Array
 from ...errors import LoopClosureError
 from ...runtime.engine.loops.assembly import Assembly
 from ...runtime.engine.loops.loop_calls import LoopCalls
-from ...runtime.linear.loops.constrained_linearisation import mechanism_at
+from ...runtime.linear.constrained_linearisation import mechanism_at
 from ...runtime.linear.mck_matrices import State
 from ...runtime.model.model import Model
 from ..case_definition import LOG_SCALE, CaseDefinition, MethodDefinition

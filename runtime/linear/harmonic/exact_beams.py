@@ -31,7 +31,7 @@ from ..frozen_loads import with_frozen_loads
 from ..input_channels import GROUND, Channel, channel
 from ..mck_matrices import State
 from ..operating_point.friction import dry_friction
-from .hysteretic_damping import Losses, loss_factor_lookup
+from .damping import Losses, loss_factor_lookup
 
 if TYPE_CHECKING:
     from mstmm.scene.tables.beam import Beam
@@ -181,12 +181,10 @@ def _with_ends_as_shapes(linear: LinearEquations, names: Sequence[str]) -> Linea
         if name not in names:
             q[shaped_model.coordinate_layout.modal[name].q_slice] = linear.state.q[slots.q_slice]
     still = np.zeros(shaped_model.nu)
-    _, a = shaped_model.looped.accelerations(
-        linear.state.t, q[None].copy(), still[None].copy(), shaped_model.looped.start_memory()[None]
-    )
+    state = State.moving(shaped_model.looped, linear.state.t, q, still)
     dry = None if linear.dry is None else dry_friction(shaped_model, still, linear.dry.amplitudes)
     return replace(
-        linear, model=shaped_model, state=State(linear.state.t, q, still, a[0]), dry=dry,
+        linear, model=shaped_model, state=state, dry=dry,
         input_channels=tuple(channel(shaped_model, given.name) for given in linear.input_channels),
         disturbance_channels=tuple(
             channel(shaped_model, given.name) for given in linear.disturbance_channels

@@ -20,7 +20,9 @@ from ...run.scene_system import SceneSystem
 from ..mck_matrices import State
 
 if TYPE_CHECKING:
+    from ...engine.compiled_scene import CompiledScene
     from ..linear_equations import LinearEquations
+
 
 #: Advance of the fastest and of the slowest motion, rad or scene lengths: no two differ by a simple
 #: fraction of a revolution, at which a periodic change would be missed.
@@ -143,10 +145,18 @@ def _state_after(linear: LinearEquations, dt: float) -> State | None:
     q, u = state.q, state.u
     for k in range(count):
         q, u = _move_state(linear, state.t + dt * (k + 1) / count, q, u, dt / count)
-    engine = linear.model.looped
-    memory = engine.start_memory()[None]
-    _, a = engine.accelerations(state.t + dt, q[None].copy(), u[None].copy(), memory)
-    return State(state.t + dt, q, u, a[0])
+    return State.moving(linear.model.looped, state.t + dt, q, u)
+
+
+def _advance(
+    model: CompiledScene, rate_t: float, t: float, q: Array, u: Array, dt: float
+) -> tuple[Array, Array]:
+    """State at t after dt (s) of steady motion, with the rates of `rate_t`, drives and loops."""
+    engine = model.looped
+    rates = engine.rates(rate_t, q, u, engine.start_memory())
+    q = move_steadily(q, rates, dt, model.coordinate_layout.quaternions.tolist())
+    whole = SceneSystem(engine).start(t, q, u)
+    return whole[: model.nq], whole[model.nq : model.nq + model.nu]
 
 
 def _move_state(
@@ -154,13 +164,36 @@ def _move_state(
 ) -> tuple[Array, Array]:
     """State at t after a step dt that satisfies drives and loops and keeps the speeds of x."""
     model, loops = linear.model, linear.constrained_motion
-    engine = model.looped
-    rates = engine.rates(t, q, u, engine.start_memory())
-    q = move_steadily(q, rates, dt, model.coordinate_layout.quaternions.tolist())
-    whole = SceneSystem(engine).start(t, q, u)
-    q, u = whole[: model.nq], whole[model.nq : model.nq + model.nu]
+    q, u = _advance(model, t, t, q, u, dt)
     if loops is not None and model.independent_speeds is not None:
         speed_indices = list(loops.independent_indices)
         motions = model.independent_speeds.motion_matrix(q, speed_indices)
         u = u + motions @ (linear.state.u[speed_indices] - u[speed_indices])
     return q, u
+
+
+# --- one later state of a steady motion, to check for constant coefficients -----------------------
+
+#: Relative tolerance for equal matrices.
+SAME = 1e-6
+#: Travel along the motion to the later state, in rad or characteristic scales.
+_AHEAD = 0.1
+
+
+def later_equations(linear: LinearEquations) -> LinearEquations:
+    """Linear equations at the later state of the motion."""
+    return equations_at(linear, later_state(linear))
+
+
+def later_state(linear: LinearEquations) -> State:
+    """Later state of the motion, at the same speeds."""
+    model, state = linear.model, linear.state
+    dt = _AHEAD / float(np.abs(state.u).max())
+    q, u = _advance(model, state.t, state.t + dt, state.q, state.u, dt)
+    return State.moving(model.looped, state.t + dt, q, u)
+
+
+def relative_difference(first: Array, second: Array) -> float:
+    """Largest difference relative to the largest entry of the first array."""
+    scale = float(np.abs(first).max(initial=0))
+    return float(np.abs(first - second).max(initial=0)) / scale if scale else 0.0

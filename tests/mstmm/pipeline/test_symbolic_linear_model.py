@@ -14,7 +14,7 @@ from sympy.physics import mechanics
 import mstmm
 from mstmm.errors import EnvironmentFailure, SceneError
 from mstmm.runtime.linear.linear_model import Linear
-from mstmm.runtime.linear.symbolic_matrices import SymbolicLinearModel
+from mstmm.runtime.linear.mck_matrices import SymbolicLinearModel
 from mstmm.runtime.model.model import Model
 from tests.reference.compare import seeded_scene
 from tests.reference.jets import Array

@@ -12,7 +12,7 @@ from scipy.special import jn_zeros
 import mstmm
 from mstmm.errors import NumericalFailure, SceneError
 from mstmm.runtime.linear import lanczos_iteration
-from mstmm.runtime.linear.mode_count import ModeCounter
+from mstmm.runtime.linear.mode_solvers import ModeCounter
 from tests.support.paths import EXAMPLES
 from tests.support.scenes.linear import beads, column, hanging, hanging_beam, masses, pendulum
 

@@ -10,7 +10,7 @@ import pytest
 import mstmm
 from tests.reference.compare import worst
 from tests.reference.jets import Array
-from tests.runtime.linear.loops.test_constrained_linearisation import LAWS as SPRINGS
+from tests.runtime.linear.test_constrained_linearisation import LAWS as SPRINGS
 from tests.runtime.packing.test_expansion import LAWS
 from tests.support.models import compile_scene
 from tests.support.scenes.linkages import OBLIQUE, bricard, four_bar

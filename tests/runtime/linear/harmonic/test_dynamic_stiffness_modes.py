@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import brentq
 
 import mstmm
-from mstmm.runtime.linear.mode_count import ModeCounter
+from mstmm.runtime.linear.mode_solvers import ModeCounter
 from tests.support.scenes.linear import UNIT
 
 

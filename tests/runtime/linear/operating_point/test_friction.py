@@ -12,7 +12,7 @@ from scipy.integrate import quad
 
 import mstmm
 from mstmm.errors import SceneError
-from mstmm.runtime.linear.rotors.frame_transform import FrameTransform
+from mstmm.runtime.linear.mck_matrices import FrameTransform
 from tests.support.scenes.linear import pendulum
 
 #: m g l and the inertia of `pendulum` about its pivot.

@@ -13,7 +13,7 @@ from mstmm.runtime.run.scene_system import SceneSystem
 from tests.reference.algebra import orientation, to_quaternion
 from tests.reference.compare import worst
 from tests.reference.jets import Array
-from tests.runtime.linear.test_drive_inputs_closed_loops import driven_five_bar
+from tests.runtime.linear.test_input_channels_drives_closed_loops import driven_five_bar
 from tests.runtime.model.test_equilibrium_closed_loops import five_bar
 from tests.runtime.packing.test_expansion import LAWS
 from tests.support.models import compile_scene

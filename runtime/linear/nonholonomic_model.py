@@ -1,9 +1,9 @@
 """First-order linear models (A, B) with nonholonomic rows: rolling contacts, coupled speeds.
 
 The state z = (x, v) holds the independent positions and speeds of the admissible perturbations
-(`admissible_perturbations`).  Rates and accelerations are linear in all perturbations and speeds,
+(`nonholonomic_perturbations`).  Rates and accelerations are linear in all perturbations and speeds,
 d/dt (phi, du) = F (phi, du), with (phi, du) = L z and z = E (phi, du).  R rotates from the axes of
-the bodies to the frames, with dR/dt = R W (`frames`); in the frames
+the bodies to the frames, with dR/dt = R W (`Frames`); in the frames
 
     A = E (W + R F R^T) L,
 
@@ -26,26 +26,34 @@ from mstmm.display import abbreviate_names
 from mstmm.errors import NumericalFailure, SceneError
 from mstmm.risk import RUN, DeferredRisks, Risk
 
-from ...engine.compiled_scene import speed_scales
-from ...result.checks.answer_checks import find_state_risks
-from ...run.scene_system import SceneSystem
-from .. import energy_shares
-from ..frequency_response import FrequencyResponse, angular_frequencies, select_inputs
-from ..harmonic.damping_checks import check_state_at_rest
-from ..input_channels import Channel, columns, some_names
-from ..linear_model import Linear
-from ..mck_matrices import State, matrices
-from ..modes import Modes
-from ..operating_point.friction_risks import IndependentMotions, friction_risks, saturation_risks
-from ..outputs.linear_outputs import Rows, outputs_of, rows_of
-from ..rotors.later_equations import SAME, relative_difference
-from ..validity import find_omissions, find_response_risks, ineffective_input_risks
-from .admissible_perturbations import RollingMechanism, reject_second_order, rolling_at
-from .eigenvalues import coupled_states, eigenpairs
-from .frames import Frames, frames_at, has_rotating_frame
+from ..engine.compiled_scene import speed_scales
+from ..result.checks.answer_checks import find_state_risks
+from ..run.scene_system import SceneSystem
+from . import energy_shares
+from .frequency_response import FrequencyResponse, angular_frequencies, select_inputs
+from .harmonic.damping import check_state_at_rest
+from .input_channels import Channel, columns, some_names
+from .linear_model import Linear
+from .mck_matrices import State, matrices
+from .modes import Modes
+from .nonholonomic_perturbations import (
+    Frames,
+    RollingMechanism,
+    coupled_states,
+    eigenpairs,
+    frames_at,
+    has_rotating_frame,
+    reject_second_order,
+    rolling_at,
+)
+from .operating_point.later_states import SAME, relative_difference
+from .operating_point.omitted_effects import IndependentMotions, friction_risks, saturation_risks
+from .outputs.linear_outputs import Rows, outputs_of, rows_of
+from .validity import find_omissions, find_response_risks, ineffective_input_risks
 
 if TYPE_CHECKING:
-    from ..outputs.output_rows import LinearQuantity
+    from .outputs.output_rows import LinearQuantity
+
 
 Complex = NDArray[np.complex128]
 #: Exact derivatives (nu, nu) at a state, by the names of `Derivatives`.
@@ -451,5 +459,4 @@ def _later_state(linear: NonholonomicLinear) -> tuple[State, Array]:
         q = q + h / 6 * (change_of_q + 2 * two + 2 * three + four)
     whole = SceneSystem(engine).start(state.t + dt, q, speeds(dt, q))
     q, u = whole[: model.nq], whole[model.nq : model.nq + model.nu]
-    _, a = engine.accelerations(state.t + dt, q[None].copy(), u[None].copy(), memory[None])
-    return State(state.t + dt, q, u, a[0]), frames.rotation(dt)
+    return State.moving(engine, state.t + dt, q, u), frames.rotation(dt)

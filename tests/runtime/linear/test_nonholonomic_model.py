@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 import mstmm
 from mstmm.errors import NumericalFailure, SceneError
 from mstmm.runtime.linear.linear_model import Linear
-from mstmm.runtime.linear.nonholonomic.linear_model import NonholonomicLinear
+from mstmm.runtime.linear.nonholonomic_model import NonholonomicLinear
 
 Array = NDArray[Any]
 GRAVITY = 9.81

@@ -1,1 +1,0 @@
-"""Linear models of scenes with closed loops."""

@@ -1,1 +1,0 @@
-"""Linear models of scenes with nonholonomic rows: rolling contacts, couplings of speeds."""

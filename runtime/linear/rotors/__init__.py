@@ -1,1 +1,0 @@
-"""Rotors: linear models in the fixed frame, multi-blade coordinates, unbalance response."""
