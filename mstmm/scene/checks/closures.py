@@ -26,7 +26,7 @@ from .expression_names import index_problem, modal_names
 from .inputs import switching_term
 
 if TYPE_CHECKING:
-    from ..tables.closures import Constraint, Coupling
+    from ..tables.closures import Coupling
     from ..tables.hinge import Hinge
     from ..tables.scene_tables import SceneTables
 
@@ -35,30 +35,33 @@ def constraint_problems(scene: SceneTables) -> Iterator[Problem]:
     """Problems of constraints: curves that cannot be followed, and duplicates."""
     for i, constraint in enumerate(scene.constraint):
         if constraint.curve is not None:
-            yield from _curve_problems(
-                constraint.curve, constraint.start or 0.0, ("constraint", i, "curve")
-            )
-    yield from _duplicates(scene)
+            start = constraint.start or 0.0
+            yield from _curve_problems(constraint.curve, start, ("constraint", i, "curve"))
+    first_indices: dict[tuple[object, ...], int] = {}
+    for i, one in enumerate(scene.constraint):
+        ends = (one.from_, one.to)
+        end_key = tuple(sorted(ends)) if one.type == DISTANCE else ends
+        curve = tuple(entry.text for entry in one.curve or ())
+        key = (one.type, end_key, one.position, one.unit_normal, curve)
+        first_index = first_indices.setdefault(key, i)
+        if first_index != i:
+            yield ("constraint", i), f"repeats constraint number {first_index + 1}; leave one out"
 
 
 def _curve_problems(
     curve: tuple[Expression, ...], start: float, place: Location
-) -> Iterator[tuple[Location, str]]:
+) -> Iterator[Problem]:
     """Problems of a curve: other names than s, kinks, or no direction at its start."""
     derivatives = []
     for k, entry in enumerate(curve):
         other_names = [name.text for name in entry.names if name.text != "s"]
         switch_text = switching_term(entry, {"s"})
         if other_names:
-            yield (
-                (*place, k),
-                f"expected a function of s only, found {other_names[0]!r}; leave it out",
-            )
+            text = f"expected a function of s only, found {other_names[0]!r}; leave it out"
+            yield (*place, k), text
         elif switch_text:
-            yield (
-                (*place, k),
-                f"no derivative where {switch_text!r} switches; use a smooth expression",
-            )
+            text = f"no derivative where {switch_text!r} switches; use a smooth expression"
+            yield (*place, k), text
         else:
             try:
                 start_values = _value_and_derivatives(entry, start)
@@ -82,23 +85,6 @@ def _value_and_derivatives(entry: Expression, start: float) -> list[float]:
     return [node_value(node, lambda _: start) for node in motion(entry, s, lambda _: s)]
 
 
-def _duplicates(scene: SceneTables) -> Iterator[Problem]:
-    """Problems of constraints that repeat an earlier one."""
-    first_indices: dict[tuple[object, ...], int] = {}
-    for i, constraint in enumerate(scene.constraint):
-        first_index = first_indices.setdefault(_duplicate_key(constraint), i)
-        if first_index != i:
-            yield ("constraint", i), f"repeats constraint number {first_index + 1}; leave one out"
-
-
-def _duplicate_key(one: Constraint) -> tuple[object, ...]:
-    """Key that is equal for constraints which repeat or contradict each other."""
-    ends = (one.from_, one.to)
-    end_key = tuple(sorted(ends)) if one.type == DISTANCE else ends
-    curve = tuple(entry.text for entry in one.curve or ())
-    return one.type, end_key, one.position, one.unit_normal, curve
-
-
 # --- couplings ------------------------------------------------------------------------------------
 
 
@@ -113,21 +99,14 @@ def coupling_problems(scene: SceneTables) -> Iterator[Problem]:
             if (message := _unknown_name_message(scene, name, coupling.key)) is not None
         ]
         yield from name_problems
-        if not name_problems and _are_types_defined(scene, coupling):
-            yield from (
-                (location, message)
-                for message in _row_messages(scene, coupling)
-                if message is not None
-            )
+        names = () if name_problems else coupling.names
+        if names and all(scene.hinges.by_name[name.hinge].facts is not None for name in names):
+            messages = _row_messages(scene, coupling)
+            yield from ((location, message) for message in messages if message is not None)
         yield from _right_side_problems(coupling, ("coupling", i, "equals"))
         first_index = first_indices.setdefault(coupling.row.text.replace(" ", ""), i)
         if first_index != i:
             yield location, f"repeats coupling number {first_index + 1}; leave one out"
-
-
-def _are_types_defined(scene: SceneTables, coupling: Coupling) -> bool:
-    """Whether the types of all hinges of a coupling are defined."""
-    return all(scene.hinges.by_name[name.hinge].facts is not None for name in coupling.names)
 
 
 def _right_side_problems(coupling: Coupling, place: Location) -> Iterator[Problem]:
@@ -174,18 +153,12 @@ def _missing_entry_message(hinge: Hinge, name: Name, key: str) -> str | None:
         if problem is not None:
             return problem
     elif name.quantity not in coordinate_names or name.index is not None:
-        coordinate_text = "".join(
-            f", {hinge.name}.{coordinate_info}" for coordinate_info in coordinate_names
-        )
-        return f"{name.text!r} is unknown; this hinge has {hinge.name}.q{coordinate_text}"
+        known = "".join(f", {hinge.name}.{coordinate}" for coordinate in coordinate_names)
+        return f"{name.text!r} is unknown; this hinge has {hinge.name}.q{known}"
     else:
         entry = coordinate_names.index(name.quantity)
-    quaternion_start = facts.quaternion
-    if (
-        key == "expression"
-        and quaternion_start is not None
-        and quaternion_start <= entry < quaternion_start + 4
-    ):
+    first = facts.quaternion
+    if key == "expression" and first is not None and first <= entry < first + 4:
         return (
             f"{name.text!r} is an entry of a quaternion, not an angle; use universal or "
             "gimbal hinges, or couple speeds"
@@ -199,32 +172,23 @@ def _missing_entry_message(hinge: Hinge, name: Name, key: str) -> str | None:
 def _row_messages(scene: SceneTables, coupling: Coupling) -> Iterator[str | None]:
     """Reasons why an expression of existing coordinates and speeds gives no constraint row."""
     row, names = coupling.row, coupling.names
-    coupled_names = [
-        name for name in names if coupling.expression is not None or name.quantity == "u"
-    ]
+    has_speeds = coupling.speeds is not None
+    coupled_names = [name for name in names if not has_speeds or name.quantity == "u"]
     switch_text = switching_term(row, {name.text for name in names})
     if switch_text:
         yield f"no derivative where {switch_text!r} switches; use a smooth expression"
         return
     if not coupled_names:
-        yield (
-            f"{describe_value(row.text)} has no speed, as in cart.u; use expression in place of "
-            f"speeds"
-        )
+        row_text = describe_value(row.text)
+        yield f"{row_text} has no speed, as in cart.u; use expression in place of speeds"
         return
     dependencies, has_remainder = dependency_parts(row, coupled_names)
-    ineffective_names = [
-        name.text
-        for name, dependency in zip(coupled_names, dependencies, strict=True)
-        if dependency is None
-    ]
-    if ineffective_names:
-        yield f"{ineffective_names[0]!r} has no effect; leave it out"
-    if coupling.speeds is not None and any(
-        set(dependency or ()) & set(coupled_names) for dependency in dependencies
-    ):
+    if None in dependencies:
+        ineffective = coupled_names[dependencies.index(None)]
+        yield f"{ineffective.text!r} has no effect; leave it out"
+    if has_speeds and any(set(found or ()) & set(coupled_names) for found in dependencies):
         yield "not linear in the speeds; write a sum of speeds with factors that contain none"
-    elif coupling.speeds is not None and has_remainder:
+    elif has_speeds and has_remainder:
         yield "a term has no speed; move it to equals"
     else:
         yield _derivative_message(scene, row, coupled_names)
@@ -267,11 +231,8 @@ def _all_driven_message(scene: SceneTables, names: list[Name]) -> str | None:
     for name in names:
         number, _, entry = resolve_coordinate(scene, name)
         hinge = scene.hinges[number]
-        if (
-            hinge.is_released
-            or hinge.name in released_hinges
-            or not any((hinge.drive or ())[entry : entry + 1])
-        ):
+        is_released = hinge.is_released or hinge.name in released_hinges
+        if is_released or not any((hinge.drive or ())[entry : entry + 1]):
             return None
     names_text = " and ".join(dict.fromkeys(name.text for name in names))
     return f"drives already prescribe {names_text}; leave out one drive or the coupling"

@@ -41,12 +41,10 @@ def closure_row_groups(scene: SceneTables) -> Iterator[RowGroup]:
     for constraint in scene.constraint:
         yield _row_group(scene, (constraint.from_, constraint.to), constraint.rows)
     for coupling in scene.coupling:
-        coupled_hinges = (
-            scene.hinges.by_name[name] for name in dict.fromkeys(n.hinge for n in coupling.names)
-        )
-        yield _row_group(
-            scene, [end for hinge in coupled_hinges for end in (hinge.inboard, hinge.outboard)], 1
-        )
+        names = dict.fromkeys(name.hinge for name in coupling.names)
+        hinges = [scene.hinges.by_name[name] for name in names]
+        ends = [end for hinge in hinges for end in (hinge.inboard, hinge.outboard)]
+        yield _row_group(scene, ends, 1)
 
 
 def resolve_coordinate(scene: SceneTables, name: Name) -> tuple[int, str, int]:
@@ -61,10 +59,8 @@ def resolve_coordinate(scene: SceneTables, name: Name) -> tuple[int, str, int]:
     if name.quantity in ("q", "u"):
         return hinge, name.quantity, name.index or 0
     facts = scene.hinges[hinge].facts
-    coordinate_names = (
-        [coordinate_info.name for coordinate_info in facts.coordinates] if facts is not None else []
-    )
-    return hinge, "q", coordinate_names.index(name.quantity)
+    coordinates = () if facts is None else facts.coordinates
+    return hinge, "q", [coordinate.name for coordinate in coordinates].index(name.quantity)
 
 
 def _row_group(scene: SceneTables, ends: Sequence[str], count: int) -> RowGroup:
@@ -98,11 +94,9 @@ class ConnectivityGraph:
         if node is not None:
             return node, 0
         chain_position = self.scene.bodies.place(name)
-        return (
-            (GROUND, 0)
-            if chain_position is None
-            else (len(self.index) + chain_position[0], chain_position[1])
-        )
+        if chain_position is None:
+            return GROUND, 0
+        return len(self.index) + chain_position[0], chain_position[1]
 
     def scene_location(self, edge: int) -> tuple[str, int]:
         """Table and index of an edge in the scene."""

@@ -8,7 +8,6 @@ from itertools import chain as one_after_another
 from itertools import islice
 from typing import TYPE_CHECKING
 
-from ...expression.expression import Expression
 from ...expression.parser import context_of_name
 from ..tables.closures import CURVE
 from ..validators.rotations_and_inertia import negative_moment_message, triangle_message
@@ -16,6 +15,7 @@ from ..validators.scalars_and_vectors import GROUND, Location, split_reference
 from ..validators.validation_messages import MAX_PROBLEMS, TABLES, Problem, did_you_mean
 from . import closures, flexible_bodies, inputs, topology
 from .expression_names import Scope, modal_names, name_problem
+from .user_types import hinge_name_at, scene_expressions
 
 if TYPE_CHECKING:
     from ..tables.body import BodyTable
@@ -68,21 +68,19 @@ def _duplicate_problems(scene: SceneTables) -> Iterator[Problem]:
         for i, element in enumerate(getattr(scene, table)):
             first_index = first_indices.setdefault(element.name, i)
             if first_index != i:
-                yield (
-                    (table, i, "name"),
-                    f'"{element.name}" is also the name of {table} number {first_index + 1}; '
-                    f"rename one",
-                )
+                owner = f"{table} number {first_index + 1}"
+                yield (table, i, "name"), _shared_name_message(element.name, owner)
     labels_by_name: dict[str, str] = {}
     for table in ("body", "hinge", "beam", "elastic", "chain", "bushing", "constraint", "coupling"):
         label = _TABLE_LABELS.get(table, f"a {table}")
         for i, element in enumerate(getattr(scene, table)):
             first_label = labels_by_name.setdefault(element.name, label)
             if first_label != label and {table, first_label} not in _SHARED_NAME_TABLES:
-                yield (
-                    (table, i, "name"),
-                    f'"{element.name}" is also the name of {first_label}; rename one',
-                )
+                yield (table, i, "name"), _shared_name_message(element.name, first_label)
+
+
+def _shared_name_message(name: str, owner: str) -> str:
+    return f'"{name}" is also the name of {owner}; rename one'
 
 
 #: Name of an element of a table in messages.
@@ -158,16 +156,12 @@ def _axes_problems(scene: SceneTables, i: int) -> Iterator[Problem]:
     is_body = bodies.find(load.axes) is not None
     if load.axes in ("inertial", "body"):
         if is_body and not (load.axes == "body" == split_reference(load.on)[0]):
-            yield (
-                ("load", i, "axes"),
-                f'"{load.axes}" is ambiguous: a body has this name; rename the body',
-            )
+            text = f'"{load.axes}" is ambiguous: a body has this name; rename the body'
+            yield ("load", i, "axes"), text
     elif not is_body:
         options = ["inertial", "body", *(body.name for body in scene.skeleton.body)]
-        yield (
-            ("load", i, "axes"),
-            f'there is no body "{load.axes}"{did_you_mean(load.axes, options)}',
-        )
+        hint = did_you_mean(load.axes, options)
+        yield ("load", i, "axes"), f'there is no body "{load.axes}"{hint}'
 
 
 def body_tables(scene: SceneTables) -> Iterator[tuple[Location, str, BodyTable]]:
@@ -183,62 +177,39 @@ def _inertia_problems(scene: SceneTables) -> Iterator[Problem]:
     for location, _, body in body_tables(scene):
         if scene.allow_unphysical_inertia or body.allow_unphysical_inertia:
             continue
-        negative_text = negative_moment_message(body.inertia_matrix)
-        triangle_text = triangle_message(body.inertia_matrix)
-        if negative_text is not None:
-            yield (*location, "inertia"), f"{negative_text}, or accept it with {_ACCEPT_KEY}"
-        elif triangle_text is not None:
-            yield (
-                (*location, "inertia"),
-                f"{triangle_text}, so no body has this inertia; correct it, or accept it with "
-                f"{_ACCEPT_KEY}",
-            )
-
-
-_ACCEPT_KEY = "allow_unphysical_inertia = true"
+        text = negative_moment_message(body.inertia_matrix)
+        if text is None and (text := triangle_message(body.inertia_matrix)) is not None:
+            text = f"{text}, so no body has this inertia; correct it"
+        if text is not None:
+            remedy = "or accept it with allow_unphysical_inertia = true"
+            yield (*location, "inertia"), f"{text}, {remedy}"
 
 
 # --- names in expressions -------------------------------------------------------------------------
 
 
 def _expression_problems(scene: SceneTables) -> Iterator[Problem]:
-    hinges, bodies = scene.hinges, scene.skeleton.bodies
+    """Problems of names; those in couplings are checked with the couplings."""
+    hinges = scene.hinges
     curves = {constraint.name for constraint in scene.constraint if constraint.type == CURVE}
     general_scope = Scope(
-        hinges, bodies, flexible=modal_names(scene), inputs=scene.channels, curves=curves
+        hinges,
+        scene.skeleton.bodies,
+        flexible=modal_names(scene),
+        inputs=scene.channels,
+        curves=curves,
     )
-    event_scope = replace(general_scope, positions=True)
-    for i, hinge in enumerate(scene.hinge):
-        hinge_scope = replace(general_scope, own=hinge)
-        for k, effort in enumerate(hinge.law.effort):
-            yield from _name_problems(effort, hinge_scope, ("hinge", i, "law", "effort", k))
-        if hinge.release is not None:
-            release_scope = replace(event_scope, own=hinge)
-            yield from _name_problems(hinge.release, release_scope, ("hinge", i, "release"))
-    for i, chain in enumerate(scene.chain):
-        for j, table in enumerate(chain.hinge):
-            member_scope = replace(general_scope, own=hinges[hinges.starts[i] + j])
-            for k, effort in enumerate(table.law.effort):
-                yield from _name_problems(
-                    effort, member_scope, ("chain", i, "hinge", j, "law", "effort", k)
-                )
-    for i, load in enumerate(scene.load):
-        for key in ("force", "moment", "force_per_length"):
-            for k, entry in enumerate(getattr(load, key) or ()):
-                yield from _name_problems(entry, general_scope, ("load", i, key, k))
-    for i, event in enumerate(scene.event):
-        yield from _name_problems(event.when, event_scope, ("event", i, "when"))
-    for i, spring in enumerate(scene.spring):
-        yield from _name_problems(
-            spring.law.effort, replace(general_scope, spring=True), ("spring", i, "law", "effort")
+    for location, expression, own, is_condition in scene_expressions(scene):
+        if location[0] == "coupling" or not expression.names:
+            continue
+        hinge = None if own is None else hinges.by_name[hinge_name_at(scene, location)]
+        scope = replace(
+            general_scope, own=hinge, positions=is_condition, spring=location[0] == "spring"
         )
-
-
-def _name_problems(expression: Expression, scope: Scope, place: Location) -> Iterator[Problem]:
-    for name in expression.names:
-        message = name_problem(name, scope)
-        if message is not None:
-            yield place, message + context_of_name(expression.text, name)
+        for name in expression.names:
+            message = name_problem(name, scope)
+            if message is not None:
+                yield location, message + context_of_name(expression.text, name)
 
 
 # --- names of other programs ----------------------------------------------------------------------

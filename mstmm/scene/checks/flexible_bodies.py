@@ -6,10 +6,11 @@ from collections.abc import Iterator, Sequence
 from math import hypot, sqrt
 from typing import TYPE_CHECKING, NamedTuple
 
-from ...numerics.rotations import Matrix, Vector, dot, norm, rotate, unit_vector
+from ...numerics.rotations import Vector, dot, norm, rotate, unit_vector
 from ...risk import Risk
+from ..tables.beam import ROOT
 from ..tables.hinge_frames import initial_motion_axes
-from ..validators.scalars_and_vectors import Location, split_reference
+from ..validators.scalars_and_vectors import Problem, split_reference
 from .topology import inboard_hinges_by_body
 
 if TYPE_CHECKING:
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from ..tables.hinge import Hinge
     from ..tables.scene_tables import SceneTables
 
-Problem = tuple[Location, str]
 
 #: Length over height of the section below which shear and rotary inertia are no longer small.
 MIN_SLENDERNESS = 10.0
@@ -117,12 +117,7 @@ def free_axes(hinge: Hinge, released: bool = False) -> tuple[Vector, ...]:
     free = (
         a for k, a in enumerate(rotation_axes) if any(a) and (k >= len(drive) or drive[k] is None)
     )
-    return tuple(_unit_axis(axis) for axis in free)
-
-
-def _unit_axis(axis: Vector) -> Vector:
-    x, y, z = axis if abs(norm(axis) - 1) <= 1e-15 else unit_vector(axis)
-    return (x, y, z)
+    return tuple((x, y, z) for x, y, z in map(unit_vector, free))
 
 
 def _free_component(beam: Beam, hinge: Hinge, direction: Vector, released: bool = False) -> float:
@@ -155,7 +150,8 @@ def flexible_warnings(scene: SceneTables) -> Iterator[Risk]:
     yield from short_beam_warnings(scene)
     for body in (*scene.beam, *scene.elastic):
         if max(body.damping.ratio) >= 1:
-            ratio, name = max(body.damping.ratio), _body_label(scene, body.name)
+            table = "beam" if body in scene.beam else "elastic"
+            ratio, name = max(body.damping.ratio), f'{table} "{body.name}"'
             yield Risk(
                 "damping", name, f"{name}: damping: a ratio of {ratio:g} is critical or above",
                 "write 0.01 for 1 percent", ratio, 1.0, invalidates=False, seen_before_run=True,
@@ -175,11 +171,6 @@ def flexible_warnings(scene: SceneTables) -> Iterator[Risk]:
     for hinge in inboard_hinges.values():
         if hinge.outboard_body in tangent and free_axes(hinge):
             yield _tangent_frame_warning(f'elastic "{hinge.outboard_body}"', hinge)
-
-
-def _body_label(scene: SceneTables, name: str) -> str:
-    table = "beam" if any(beam.name == name for beam in scene.beam) else "elastic"
-    return f'{table} "{name}"'
 
 
 def short_beam_warnings(scene: SceneTables) -> Iterator[Risk]:
@@ -236,9 +227,8 @@ def _square_height(section: Section, k: int) -> tuple[float, str]:
     """
     rotary_inertia, bending_stiffness = section.rotary_inertia, section.bending_stiffness
     if rotary_inertia is not None and section.mass_per_length:
-        return 12 * rotary_inertia[
-            k
-        ] / section.mass_per_length, "rotary_inertia and mass_per_length"
+        square = 12 * rotary_inertia[k] / section.mass_per_length
+        return square, "rotary_inertia and mass_per_length"
     if rotary_inertia is None and bending_stiffness is not None and section.axial_stiffness:
         source = "bending_stiffness and axial_stiffness"
         return 12 * bending_stiffness[k] / section.axial_stiffness, source
@@ -254,13 +244,12 @@ def _tangent_frame_warnings(beam: Beam, hinge: Hinge) -> Iterator[Risk]:
     end = hinge.outboard_end
     if beam.frame_kind != "tangent" or beam.frame_end not in ("", end) or beam.quadrature:
         return
-    for direction, axis in _ROTATION_AXES.items():
-        if (
-            _has_bending_shapes(beam, direction)
-            and _free_component(beam, hinge, axis) > _MIN_FREE_COMPONENT
-        ):
-            yield _tangent_frame_warning(f'beam "{beam.name}"', hinge)
-            return
+    if any(
+        _has_bending_shapes(beam, direction)
+        and _free_component(beam, hinge, axis) > _MIN_FREE_COMPONENT
+        for direction, axis in _ROTATION_AXES.items()
+    ):
+        yield _tangent_frame_warning(f'beam "{beam.name}"', hinge)
 
 
 def _tangent_frame_warning(body: str, hinge: Hinge) -> Risk:
@@ -283,10 +272,10 @@ def _basis_warnings(scene: SceneTables, beam: Beam) -> Iterator[Risk]:
             if name != beam.name:
                 continue
             x = beam.end_x(end)
-            moment_free = x >= beam.length - tolerance or (
-                x <= tolerance and beam.basis != _CLAMPED_FREE
-            )
-            if moment_free and _carries_moment(beam, hinge, end, reference == hinge.outboard):
+            is_root = x <= tolerance and beam.basis != _CLAMPED_FREE
+            if (is_root or x >= beam.length - tolerance) and _carries_moment(
+                beam, hinge, end, reference == hinge.outboard
+            ):
                 yield Risk(
                     "basis", f'beam "{beam.name}"',
                     f'beam "{beam.name}": basis: {beam.basis} shapes have no bending moment at '
@@ -314,8 +303,6 @@ def _carries_moment(beam: Beam, hinge: Hinge, at: str, outboard: bool) -> bool:
 
 # --- straight lines of welded beams ---------------------------------------------------------------
 
-
-ROOT = "root"
 
 #: Least cosine of the angle between the axes of two beams in line.
 _MIN_AXIS_COSINE = 0.999
@@ -356,31 +343,20 @@ def beam_lines(scene: SceneTables) -> dict[str, BeamLine]:
 
 def _aligned_beams(hinge: Hinge, beams: dict[str, Beam]) -> tuple[str, str] | None:
     """Beams that a fixed hinge joins in a straight line, (inboard, outboard); None for others."""
-    (inboard_beam, inboard_end), (outboard_beam, outboard_end) = (
-        split_reference(hinge.inboard),
-        split_reference(hinge.outboard),
-    )
-    if inboard_beam not in beams or outboard_beam not in beams:
+    (inboard, inboard_end), (outboard, outboard_end) = (
+        split_reference(hinge.inboard), split_reference(hinge.outboard)
+    )  # fmt: skip
+    if inboard not in beams or outboard not in beams:
         return None
-    end_sides = (
-        _end_side(beams[inboard_beam], inboard_end),
-        _end_side(beams[outboard_beam], outboard_end),
-    )
-    if 0 in end_sides:
+    sides = _end_side(beams[inboard], inboard_end), _end_side(beams[outboard], outboard_end)
+    if 0 in sides:
         return None
-    outboard_axes = tuple(zip(*_end_rotation(beams[outboard_beam], outboard_end), strict=True))
-    outboard_direction = [
-        row[0] for row in outboard_axes
-    ]  # the axis of the outer beam, in the axes of its end
-    direction = rotate(
-        _end_rotation(beams[inboard_beam], inboard_end), rotate(hinge.rotation, outboard_direction)
-    )
-    sign = -1.0 if end_sides[0] == end_sides[1] else 1.0  # axes are opposite where two tips meet
-    return (inboard_beam, outboard_beam) if sign * direction[0] > _MIN_AXIS_COSINE else None
-
-
-def _end_rotation(beam: Beam, end: str) -> Matrix:
-    return beam.ends[end or ROOT].rotation
+    # The axis of the outer beam in the axes of its end is the first row of their rotation.
+    outboard_direction = beams[outboard].ends[outboard_end or ROOT].rotation[0]
+    inboard_rotation = beams[inboard].ends[inboard_end or ROOT].rotation
+    direction = rotate(inboard_rotation, rotate(hinge.rotation, outboard_direction))
+    sign = -1.0 if sides[0] == sides[1] else 1.0  # axes are opposite where two tips meet
+    return (inboard, outboard) if sign * direction[0] > _MIN_AXIS_COSINE else None
 
 
 def _end_side(beam: Beam, end: str) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ...numerics.rotations import Vector, cross, norm, product, rotate, transpose
 from ...risk import Risk
@@ -17,7 +17,9 @@ from . import flexible_bodies, inputs
 from .consistency import body_tables
 
 if TYPE_CHECKING:
+    from ..tables.beam import Beam
     from ..tables.body import Body
+    from ..tables.elastic import Elastic
     from ..tables.hinge import Hinge, HingeTable
     from ..tables.loads import Load
     from ..tables.scene_tables import SceneTables
@@ -96,17 +98,10 @@ def _degree_warnings(scene: SceneTables) -> Iterator[Risk]:
     for bushing in scene.bushing:
         yield from _angle_warnings(f'bushing "{bushing.name}": orientation', bushing.orientation)
         yield from _angle_warnings(f'bushing "{bushing.name}": rest', bushing.rest.orientation)
-    for body in scene.body:
-        yield from _end_warnings(body.name, body.ends)
-    for beam in scene.beam:
-        yield from _end_warnings(beam.name, beam.ends)
-    for elastic in scene.elastic:
-        yield from _end_warnings(elastic.name, elastic.ends)
-
-
-def _end_warnings(owner: str, ends: Mapping[str, Any]) -> Iterator[Risk]:
-    for name, end in ends.items():
-        yield from _angle_warnings(f'"{owner}.{name}": orientation', end.orientation)
+    owners: tuple[Body | Beam | Elastic, ...] = (*scene.body, *scene.beam, *scene.elastic)
+    for body in owners:
+        for name, end in body.ends.items():
+            yield from _angle_warnings(f'"{body.name}.{name}": orientation', end.orientation)
 
 
 def _hinge_warnings(name: str, hinge: HingeTable) -> Iterator[Risk]:

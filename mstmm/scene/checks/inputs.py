@@ -9,11 +9,10 @@ from ...errors import ExpressionError
 from ...expression.derivatives import motion_at
 from ...expression.expression import SWITCHES, Expression
 from ...risk import Risk
-from ..tables.inputs import Input
 from ..tables.scene_tables import name_problem
 from ..validators.scalars_and_vectors import Location, describe_value
 from ..validators.validation_messages import Problem, did_you_mean
-from .user_types import typed_tables
+from .user_types import scene_expressions, typed_tables
 
 if TYPE_CHECKING:
     from ..tables.scene_tables import SceneTables
@@ -35,10 +34,8 @@ def problems(scene: SceneTables) -> Iterator[Problem]:
             if not problem and element.name in SCENE_QUANTITIES:
                 problem = _reserved_name_message(element.name)
             if not problem and labels_by_name.get(element.name, label) != label:
-                problem = (
-                    f'"{element.name}" is also the name of {labels_by_name[element.name]}; '
-                    f"rename one"
-                )
+                owner = labels_by_name[element.name]
+                problem = f'"{element.name}" is also the name of {owner}; rename one'
             labels_by_name[element.name] = label
             if problem:
                 yield (table, i, "name"), problem
@@ -51,20 +48,15 @@ def problems(scene: SceneTables) -> Iterator[Problem]:
     signals = [signal.name for signal in scene.signal]
     for i, input_table in enumerate(scene.input):
         if isinstance(input_table.value, str) and input_table.value not in signals:
-            options = (*signals, *scene.constants)
-            yield (
-                ("input", i, "value"),
-                f'there is no signal "{input_table.value}", and no '
-                f"constant{did_you_mean(input_table.value, options)}",
-            )
+            hint = did_you_mean(input_table.value, (*signals, *scene.constants))
+            text = f'there is no signal "{input_table.value}", and no constant{hint}'
+            yield ("input", i, "value"), text
     for _, location, element_table in typed_tables(scene):
         for name in element_table.parameters:
             if name in scene.constants or name in scene.channels:
-                yield (
-                    (*location, "parameters"),
-                    f'"{name}" is also the name of {labels_by_name[name]} of the scene; rename '
-                    f"the latter",
-                )
+                owner = f"{labels_by_name[name]} of the scene"
+                text = f'"{name}" is also the name of {owner}; rename the latter'
+                yield (*location, "parameters"), text
 
 
 def _reserved_name_message(name: str) -> str:
@@ -83,10 +75,10 @@ def _output_problems(scene: SceneTables) -> Iterator[Problem]:
     for table, names in (("input", hinges), ("signal", hinges), ("controller", owners)):
         for i, element in enumerate(getattr(scene, table)):
             if element.name in names:
-                owner_label = "a hinge" if element.name in hinges else "a body, hinge or chain"
+                owner = "a hinge" if element.name in hinges else "a body, hinge or chain"
                 yield (
                     (table, i, "name"),
-                    f'"{element.name}" is also the name of {owner_label}; rename one',
+                    f'"{element.name}" is also the name of {owner}; rename one',
                 )
     for i, output in enumerate(scene.output):
         if output.name in owners:
@@ -138,11 +130,11 @@ def drive_problems(scene: SceneTables) -> Iterator[Problem]:
             unknown = [name.text for name in entry.names if name.text not in scene.channels]
             if [name for name in unknown if name != "t"]:
                 continue  # reported by the check of the hinge
-            rateless_names = [
-                input_name.text
-                for input_name in entry.names
-                if _has_no_rates_given(inputs.get(input_name.text))
-            ]
+            used_inputs = [inputs[name.text] for name in entry.names if name.text in inputs]
+            rateless = [
+                one.name for one in used_inputs
+                if one.rates is None and not isinstance(one.value, str)
+            ]  # fmt: skip
             switching_text = switching_term(entry, scene.channels)
             if switching_text:
                 yield (
@@ -150,11 +142,11 @@ def drive_problems(scene: SceneTables) -> Iterator[Problem]:
                     f"a drive cannot switch with an input, found {switching_text!r}; give the "
                     "whole motion in the input",
                 )
-            elif rateless_names:
+            elif rateless:
                 yield (
                     entry_location,
-                    f"a drive needs the rates of the input {rateless_names[0]!r}; give them "
-                    "there, as in rates = [0, 0], or use a signal as its value",
+                    f"a drive needs the rates of the input {rateless[0]!r}; give them there, as in "
+                    "rates = [0, 0], or use a signal as its value",
                 )
             else:
                 yield from _start_problems(scene, entry, entry_location)
@@ -171,10 +163,6 @@ def switching_term(entry: Expression, names: Collection[str]) -> str:
             if term.op in SWITCHES and number in entry.required_terms:
                 return entry.text[term.start : term.end]
     return ""
-
-
-def _has_no_rates_given(one: Input | None) -> bool:
-    return one is not None and one.rates is None and not isinstance(one.value, str)
 
 
 def _start_problems(scene: SceneTables, entry: Expression, at: Location) -> Iterator[Problem]:
@@ -196,8 +184,12 @@ def input_references(scene: SceneTables) -> Iterator[tuple[str, str]]:
 
     A name occurs as often as it is referenced.
     """
-    for element in (*input_expressions(scene), *(output.of for output in scene.output)):
-        yield from ((name.text, "") for name in element.names)
+    drives = (table.drive or () for kind, _, table in typed_tables(scene) if kind == "hinge")
+    expressions = [one.expression for one in scene_expressions(scene)]
+    expressions += (entry for drive in drives for entry in drive if entry is not None)
+    expressions += (output.of for output in scene.output)
+    for expression in expressions:
+        yield from ((name.text, "") for name in expression.names)
     yield from (
         (element.value, element.name) for element in scene.input if isinstance(element.value, str)
     )
@@ -211,37 +203,13 @@ def unused_input_warnings(scene: SceneTables) -> list[Risk]:
     if not (scene.input or scene.signal):
         return []
     used_names = {name for name, _ in input_references(scene)}
-    warnings = []
-    for table in ("input",) if scene.input else ("signal",):
-        for element in getattr(scene, table):
-            if element.name not in used_names:
-                name = f'{table} "{element.name}"'
-                warnings.append(
-                    Risk(
-                        "unused-input",
-                        name,
-                        f"{name} is not used",
-                        "use it in an expression, or remove it",
-                        invalidates=False,
-                        seen_before_run=True,
-                    )
-                )
-    return warnings
-
-
-def input_expressions(scene: SceneTables) -> Iterator[Expression]:
-    """Yield every expression that may contain inputs."""
-    for kind, _, table in typed_tables(scene):
-        if kind == "hinge":
-            yield from table.law.effort
-            yield from (entry for entry in table.drive or () if entry is not None)
-    for hinge in scene.hinge:
-        if hinge.release is not None:
-            yield hinge.release
-    for load in scene.load:
-        for key in ("force", "moment", "force_per_length"):
-            yield from getattr(load, key) or ()
-    for event in scene.event:
-        yield event.when
-    for spring in scene.spring:
-        yield spring.law.effort
+    table = "input" if scene.input else "signal"
+    unused = (one.name for one in getattr(scene, table) if one.name not in used_names)
+    remedy = "use it in an expression, or remove it"
+    return [
+        Risk(
+            "unused-input", f'{table} "{name}"', f'{table} "{name}" is not used', remedy,
+            invalidates=False, seen_before_run=True,
+        )
+        for name in unused
+    ]  # fmt: skip

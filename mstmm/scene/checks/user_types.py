@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ...expression.expression import Expression
 from ...ir.element_spec import ElementSpec
@@ -37,6 +37,49 @@ def typed_tables(scene: SceneTables) -> Iterator[tuple[str, Location, Any]]:
                 yield _KINDS_BY_TABLE[table][0], ("chain", i, table, k), element
 
 
+class SceneExpression(NamedTuple):
+    """Expression of a scene, with its location, and the hinge whose q and u need no prefix.
+
+    Conditions are those of events and releases.
+    """
+
+    location: Location
+    expression: Expression
+    own: HingeTable | None = None
+    is_condition: bool = False
+
+
+def scene_expressions(scene: SceneTables) -> Iterator[SceneExpression]:
+    """Yield all expressions of a scene but drives, outputs and right sides of couplings."""
+    for i, hinge in enumerate(scene.hinge):
+        for k, effort in enumerate(hinge.law.effort):
+            yield SceneExpression(("hinge", i, "law", "effort", k), effort, hinge)
+        if hinge.release is not None:
+            yield SceneExpression(("hinge", i, "release"), hinge.release, hinge, is_condition=True)
+    for i, chain in enumerate(scene.chain):
+        for j, pattern in enumerate(chain.hinge):
+            for k, effort in enumerate(pattern.law.effort):
+                location: Location = ("chain", i, "hinge", j, "law", "effort", k)
+                yield SceneExpression(location, effort, pattern)
+    for i, load in enumerate(scene.load):
+        for key in ("force", "moment", "force_per_length"):
+            for k, entry in enumerate(getattr(load, key) or ()):
+                yield SceneExpression(("load", i, key, k), entry)
+    for i, event in enumerate(scene.event):
+        yield SceneExpression(("event", i, "when"), event.when, is_condition=True)
+    for i, spring in enumerate(scene.spring):
+        yield SceneExpression(("spring", i, "law", "effort"), spring.law.effort)
+    for i, coupling in enumerate(scene.coupling):
+        yield SceneExpression(("coupling", i, coupling.key), coupling.row)
+
+
+def hinge_name_at(scene: SceneTables, place: Location) -> str:
+    """Name of the hinge at a location; for a chain pattern, of the first member with it."""
+    if place[0] == "chain":
+        return scene.hinges.name(scene.hinges.starts[int(place[1])] + int(place[3]))
+    return scene.hinge[int(place[1])].name
+
+
 def used_types(scene: SceneTables) -> set[tuple[str, str]]:
     """Set of (kind, type) of all elements of a scene."""
     return {(kind, element.type) for kind, _, element in typed_tables(scene)}
@@ -46,7 +89,7 @@ def type_problems(
     scene: SceneTables, known: Mapping[tuple[str, str], ElementSpec]
 ) -> list[Problem]:
     """Problems of unknown types, and of elements that do not fit their definition."""
-    type_problem_list: list[Problem] = []
+    problems: list[Problem] = []
     builtin = dict(_KINDS_BY_TABLE.values())
     for kind, location, element in typed_tables(scene):
         if element.type in builtin[kind]:
@@ -57,12 +100,10 @@ def type_problems(
             synonym_of = _hinge_type_for(element.type) if kind == "hinge" else None
             hint = did_you_mean(element.type, [*builtin[kind], *user_types])
             hint = f'; use "{synonym_of}"' if synonym_of else hint
-            type_problem_list.append(
-                ((*location, "type"), f'unknown {kind} type "{element.type}"{hint}')
-            )
+            problems.append(((*location, "type"), f'unknown {kind} type "{element.type}"{hint}'))
         else:
-            type_problem_list += _element_problems(scene, location, element, spec)
-    return type_problem_list
+            problems += _element_problems(scene, location, element, spec)
+    return problems
 
 
 def apply_definitions(
@@ -72,7 +113,7 @@ def apply_definitions(
 
     Returns the problems found.
     """
-    problem_list: list[Problem] = []
+    problems: list[Problem] = []
     for kind, location, element in typed_tables(scene):
         spec = known.get((kind, element.type))
         if spec is not None and spec.facts is not None:
@@ -80,23 +121,16 @@ def apply_definitions(
             try:
                 vars(element).update(resolve_defaults_for(element, spec.facts))
             except ValidationProblems as refused:
-                problem_list += [
-                    ((*location, *inner_location), text)
-                    for inner_location, text in refused.problems
-                ]
-    return problem_list
+                problems += (((*location, *inner), text) for inner, text in refused.problems)
+    return problems
 
 
 def copy_definitions(scene: SceneTables, other: SceneTables) -> None:
     """Copy the facts of user-defined hinge types from a scene with the same elements."""
-    for (_, _, target_table), (_, _, source_table) in zip(
-        typed_tables(scene), typed_tables(other), strict=True
-    ):
-        if (
-            getattr(source_table, "builtin", source_table) is None
-            and source_table.facts is not None
-        ):
-            vars(target_table)["facts"] = source_table.facts
+    pairs = zip(typed_tables(scene), typed_tables(other), strict=True)
+    for (kind, _, target), (_, _, source) in pairs:
+        if kind == "hinge" and source.builtin is None and source.facts is not None:
+            vars(target)["facts"] = source.facts
 
 
 def problems_of_type(scene: SceneTables, spec: ElementSpec) -> list[Problem]:
@@ -114,8 +148,8 @@ def _element_problems(
 ) -> Iterator[Problem]:
     yield from _parameter_problems(place, element.parameters, spec)
     if spec.kind == "hinge":
-        for inner_location, text in unexpected_keys(element, spec.facts):
-            yield (*place, *inner_location), text
+        for inner, text in unexpected_keys(element, spec.facts):
+            yield (*place, *inner), text
         yield from _length_problems(place, element, spec)
         yield from _index_problems(scene, element, spec)
 
@@ -126,29 +160,19 @@ def _parameter_problems(
     type_parameters = spec.parameters if spec.facts is None else spec.facts.extra_parameters()
     parameters_by_name = {p.name: p for p in type_parameters}
     for name, value in given.items():
-        value_location = (*place, "parameters", name)
-        parameter = parameters_by_name.get(name)
-        if parameter is None:
-            yield (
-                value_location,
-                f'{spec.name} has no parameter "{name}"{did_you_mean(name, parameters_by_name)}',
-            )
-        elif parameter.minimum is not None and value < parameter.minimum:
-            yield (
-                value_location,
-                f"expected {parameter.minimum:g} {parameter.unit} or more, found {value:g}",
-            )
-        elif parameter.maximum is not None and value > parameter.maximum:
-            yield (
-                value_location,
-                f"expected {parameter.maximum:g} {parameter.unit} or less, found {value:g}",
-            )
-    for parameter in type_parameters:
-        if parameter.default is None and parameter.name not in given:
-            unit = f" in {parameter.unit}" if parameter.unit else ""
-            meaning = f" ({parameter.description})" if parameter.description else ""
-            value_location = (*place, "parameters", parameter.name)
-            yield value_location, f"missing; expected a number{unit}{meaning}"
+        location, one = (*place, "parameters", name), parameters_by_name.get(name)
+        if one is None:
+            hint = did_you_mean(name, parameters_by_name)
+            yield location, f'{spec.name} has no parameter "{name}"{hint}'
+        elif one.minimum is not None and value < one.minimum:
+            yield location, f"expected {one.minimum:g} {one.unit} or more, found {value:g}"
+        elif one.maximum is not None and value > one.maximum:
+            yield location, f"expected {one.maximum:g} {one.unit} or less, found {value:g}"
+    for one in type_parameters:
+        if one.default is None and one.name not in given:
+            unit = f" in {one.unit}" if one.unit else ""
+            meaning = f" ({one.description})" if one.description else ""
+            yield (*place, "parameters", one.name), f"missing; expected a number{unit}{meaning}"
 
 
 def _length_problems(place: Location, hinge: HingeTable, spec: ElementSpec) -> Iterator[Problem]:
@@ -186,26 +210,18 @@ def _length_problems(place: Location, hinge: HingeTable, spec: ElementSpec) -> I
 
 def _index_problems(scene: SceneTables, hinge: HingeTable, spec: ElementSpec) -> Iterator[Problem]:
     """Problems of indices of a hinge's coordinates in all expressions of the scene."""
-    for location, expression, own_table in _all_expressions(scene):
-        for name in expression.names:
+    for one in scene_expressions(scene):
+        for name in one.expression.names:
             if name.quantity not in ("q", "u"):
                 continue
-            named_table = own_table if len(name.parts) == 1 else _hinge_table(scene, name.hinge)
+            named_table = one.own if len(name.parts) == 1 else _hinge_table(scene, name.hinge)
             if named_table is not hinge:
                 continue
             entries = spec.coordinates if name.quantity == "q" else spec.speeds
-            message = index_problem(
-                name, name.hinge or _hinge_name_at(scene, location), len(entries)
-            )
+            hinge_name = name.hinge or hinge_name_at(scene, one.location)
+            message = index_problem(name, hinge_name, len(entries))
             if message is not None:
-                yield location, message
-
-
-def _hinge_name_at(scene: SceneTables, place: Location) -> str:
-    """Name of the hinge at a location; for a chain pattern, of the first member with it."""
-    if place[0] == "chain":
-        return scene.hinges.name(scene.hinges.starts[int(place[1])] + int(place[3]))
-    return scene.hinge[int(place[1])].name
+                yield one.location, message
 
 
 def _hinge_table(scene: SceneTables, name: str) -> HingeTable | None:
@@ -215,29 +231,6 @@ def _hinge_table(scene: SceneTables, name: str) -> HingeTable | None:
         return None if index is None else scene.hinge[index]
     chain, k = scene.hinges.member(index)
     return scene.chain[chain].hinge_of(k)
-
-
-def _all_expressions(
-    scene: SceneTables,
-) -> Iterator[tuple[Location, Expression, HingeTable | None]]:
-    """Yield (location, expression, hinge whose q and u need no prefix) of all expressions."""
-    for kind, location, table in typed_tables(scene):
-        if kind == "hinge":
-            for k, effort in enumerate(table.law.effort):
-                yield (*location, "law", "effort", k), effort, table
-    for i, hinge in enumerate(scene.hinge):
-        if hinge.release is not None:
-            yield ("hinge", i, "release"), hinge.release, hinge
-    for i, load in enumerate(scene.load):
-        for key in ("force", "moment", "force_per_length"):
-            for k, entry in enumerate(getattr(load, key) or ()):
-                yield ("load", i, key, k), entry, None
-    for i, event in enumerate(scene.event):
-        yield ("event", i, "when"), event.when, None
-    for i, spring in enumerate(scene.spring):
-        yield ("spring", i, "law", "effort"), spring.law.effort, None
-    for i, coupling in enumerate(scene.coupling):
-        yield ("coupling", i, coupling.key), coupling.row, None
 
 
 # --- synonyms of hinge types ----------------------------------------------------------------------

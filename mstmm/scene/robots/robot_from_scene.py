@@ -100,20 +100,18 @@ class _SceneReader:
         self._used_names = {self.world, *self._name_counts}
 
     def robot(self, name: str) -> Robot:
-        ends = [self._end_link(*coupling_or_end) for coupling_or_end in self._fixed_links()]
-        links = (
-            Link(self.world),
-            *map(self._link, self.bodies.values()),
-            *(mimic_or_link for mimic_or_link, _ in ends),
-        )
+        ends = [self._end_link(*fixed) for fixed in self._fixed_links()]
+        bodies = map(self._link, self.bodies.values())
+        links = (Link(self.world), *bodies, *(link for link, _ in ends))
         joints = (*map(self._joint, self.scene.hinges), *(joint for _, joint in ends))
-        mimics = tuple(
-            mimic_or_link
-            for coupling_or_end in self.scene.coupling
-            if (mimic_or_link := self._mimic(coupling_or_end))
-        )
-        visuals = tuple(self._visual(shape) for shape in self.scene.shape if self._is_drawn(shape))
-        self._note_table_omissions()
+        mimics = tuple(mimic for mimic in map(self._mimic, self.scene.coupling) if mimic)
+        visuals = tuple(visual for visual in map(self._visual, self.scene.shape) if visual)
+        for table in _UNSUPPORTED_TABLES:
+            if count := len(getattr(self.scene, table)):
+                text = f"left out, {count} of them" if count > 1 else "left out"
+                self._note(f"[[{table}]]", text)
+        if self.scene.gravity != _ASSUMED_GRAVITY:
+            self._note("gravity", "left out; readers of URDF assume 9.81 m/s^2 along -z")
         return Robot(name, name, links, joints, mimics, visuals, tuple(self.notes))
 
     def _link_name(self, body: str) -> str:
@@ -162,15 +160,10 @@ class _SceneReader:
         end_frame = IDENTITY_POSE
         if body != GROUND:
             end_frame = self._to_link_axes(body, _end_pose(self.bodies[body], end))
-        joint, holder = self._free_name(f"{name}_fixed"), self._link_name(body)
-        return Link(name), Joint(joint, FIXED, holder, name, end_frame)
-
-    def _free_name(self, name: str) -> str:
-        """Make a joint name unique by appending _."""
-        used_names = {self._joint_name(hinge.name) for hinge in self.scene.hinges}
-        while name in used_names:
-            name += "_"
-        return name
+        joint, used_names = f"{name}_fixed", {self._joint_name(h.name) for h in self.scene.hinges}
+        while joint in used_names:
+            joint += "_"
+        return Link(name), Joint(joint, FIXED, self._link_name(body), name, end_frame)
 
     def _joint(self, hinge: Hinge) -> Joint:
         hinge_pose = Pose(rotation=hinge.rotation)
@@ -178,14 +171,12 @@ class _SceneReader:
             pose = Pose(hinge.position).compose(hinge_pose)
         else:
             holder = self.bodies[hinge.inboard_body]
-            pose = self._to_link_axes(holder.name, _end_pose(holder, hinge.inboard_end)).compose(
-                hinge_pose
-            )
+            end_pose = self._to_link_axes(holder.name, _end_pose(holder, hinge.inboard_end))
+            pose = end_pose.compose(hinge_pose)
         self._note_hinge_omissions(hinge)
         parent, child = map(self._link_name, (hinge.inboard_body, hinge.outboard_body))
-        return Joint(
-            self._joint_name(hinge.name), hinge.type, parent, child, pose, _joint_keys(hinge)
-        )
+        name = self._joint_name(hinge.name)
+        return Joint(name, hinge.type, parent, child, pose, _joint_keys(hinge))
 
     def _note_hinge_omissions(self, hinge: Hinge) -> None:
         facts, element = hinge.facts, f"hinge {hinge.name!r}"
@@ -222,12 +213,11 @@ class _SceneReader:
         own_joint, other_joint = self._joint_name(mimic.follower), self._joint_name(mimic.leader)
         return replace(mimic, follower=own_joint, leader=other_joint)
 
-    def _is_drawn(self, shape: Shape) -> bool:
+    def _visual(self, shape: Shape) -> Visual | None:
+        """Visual of a shape; None, with a note, for types that URDF does not have."""
         if shape.type not in _SUPPORTED_SHAPES:
             self._note(f"shape on {shape.on!r}", f"left out: URDF has no {shape.type}")
-        return shape.type in _SUPPORTED_SHAPES
-
-    def _visual(self, shape: Shape) -> Visual:
+            return None
         pose = Pose(shape.position, shape.rotation)
         keys = {
             key: value for key in ("type", "size", "radius", "length", "file", "scale", "color")
@@ -238,15 +228,6 @@ class _SceneReader:
             return Visual(self.world, pose, keys)
         link_pose = self._to_link_axes(body, _end_pose(self.bodies[body], end)).compose(pose)
         return Visual(self._link_name(body), link_pose, keys)
-
-    def _note_table_omissions(self) -> None:
-        for table in _UNSUPPORTED_TABLES:
-            if count := len(getattr(self.scene, table)):
-                self._note(
-                    f"[[{table}]]", f"left out, {count} of them" if count > 1 else "left out"
-                )
-        if self.scene.gravity != _ASSUMED_GRAVITY:
-            self._note("gravity", "left out; readers of URDF assume 9.81 m/s^2 along -z")
 
 
 def _names_by_scene_name(names: Mapping[str, str]) -> dict[str, list[str]]:
@@ -342,12 +323,11 @@ def _given_values(table: Any, *keys: str) -> dict[str, float]:
 
 def _linear_mimic(coupling: Coupling) -> Mimic | None:
     """Mimic q_1 = m q_2 + b of a row that is linear in two coordinates; None for others."""
-    names, equals = list(_coordinate_hinges(coupling)), coupling.equals
-    if coupling.expression is None or len(names) != 2 or (equals is not None and equals.names):
+    parts = (name.text.partition(".") for name in coupling.row.names)
+    names = [hinge for hinge, _, quantity in parts if quantity == "q"]
+    row, equals = coupling.expression, coupling.equals
+    if row is None or len(names) != 2 or equals is None or equals.names:
         return None
-    if equals is None:
-        return None
-    row = coupling.expression
 
     def row_value(a: float, b: float) -> float:
         values_by_hinge = dict(zip(names, (a, b), strict=True))
@@ -363,11 +343,3 @@ def _linear_mimic(coupling: Coupling) -> Mimic | None:
     if not is_linear or a == 0 or b == 0:
         return None
     return Mimic(names[0], names[1], -b / a, ((equals.constant or 0.0) - offset) / a)
-
-
-def _coordinate_hinges(coupling: Coupling) -> Iterator[str]:
-    """Names of hinges whose q is in a row."""
-    for name in coupling.row.names:
-        hinge, _, quantity = name.text.partition(".")
-        if quantity == "q":
-            yield hinge

@@ -187,12 +187,9 @@ def merge_inertia(parts: Sequence[tuple[Link, Pose]]) -> tuple[float, Vector, Ma
     mass_centres = [pose.compose(Pose(link.center)).position for link, pose in parts]
     center = ZERO
     if mass > 0:
+        masses = [link.mass for link, _ in parts]
         x, y, z = (
-            sum(
-                link.mass * mass_centre[i]
-                for (link, _), mass_centre in zip(parts, mass_centres, strict=True)
-            )
-            / mass
+            sum(m * centre[i] for m, centre in zip(masses, mass_centres, strict=True)) / mass
             for i in range(3)
         )
         center = (x, y, z)
@@ -209,17 +206,13 @@ def remove_rounding_inertia(robot: Robot) -> Robot:
     largest_entries = {
         link.name: max(abs(x) for row in link.inertia for x in row) for link in robot.links
     }
-    largest, mass = (
-        max(largest_entries.values(), default=0.0),
-        sum(link.mass for link in robot.links),
-    )
+    largest = max(largest_entries.values(), default=0.0)
+    mass = sum(link.mass for link in robot.links)
     affected_links = [
-        link
-        for link in robot.links
-        if link.mass == 0
-        and largest_entries[link.name] > 0
+        link for link in robot.links
+        if link.mass == 0 and largest_entries[link.name] > 0
         and is_rounding(largest_entries[link.name], largest, mass)
-    ]
+    ]  # fmt: skip
     if not affected_links:
         return robot
     note_text = "no mass, and an inertia that is rounding; both are treated as zero"

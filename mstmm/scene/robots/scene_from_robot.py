@@ -107,10 +107,8 @@ class _SceneWriter:
         self.robot, self.tree, self.choices = robot, tree, choices
         self.notes = list(robot.notes)
         if len(tree.roots) > 1:
-            names_text = ", ".join(map(repr, tree.roots[:4])) + (
-                ", ..." if len(tree.roots) > 4 else ""
-            )
-            text = f"{len(tree.roots)} of them: {names_text}; each has its own base"
+            roots = [*map(repr, tree.roots[:4]), *(["..."] if len(tree.roots) > 4 else [])]
+            text = f"{len(tree.roots)} of them: {', '.join(roots)}; each has its own base"
             self.notes.append(ImportNote(robot.where, "trees", text))
         valid_mimics = list(self._valid_mimics())
         mimics = list({mimic.follower: mimic for mimic in valid_mimics}.values())
@@ -126,13 +124,10 @@ class _SceneWriter:
         self.body_frames = dict[str, tuple[str, Pose]]()
         for link in tree.outward:
             self.body_frames[link.name] = self._owner_and_pose(link)
-        self._names = NameRegistry()
-        self._bodies = self._names.register_all(self.bodies(), "link", tree.links)
+        self._bodies = NameRegistry().register_all(self.bodies(), "link", tree.links)
         hinges = NameRegistry()
         moving_joints = [
-            robot_joint.name
-            for robot_joint in robot.joints
-            if self.body_frames[robot_joint.child][0] == robot_joint.child
+            one.name for one in robot.joints if self.body_frames[one.child][0] == one.child
         ]
         self.joints = hinges.register_all(moving_joints, "joint")
         #: Position of the notes on names, which are written when all ends are defined.
@@ -150,27 +145,23 @@ class _SceneWriter:
 
         `names` are the original names that its [names] keeps.
         """
-        kept_names, lost_names = list[str](), list[str]()
+        renames: dict[bool, list[str]] = {False: [], True: []}
         for table, names_by_file in (("body", self._bodies), ("hinge", self.joints)):
             for file_name, scene_name in names_by_file.items():
                 if file_name != scene_name:
                     is_kept = names.get(table, {}).get(file_name) == scene_name
-                    (kept_names if is_kept else lost_names).append(
-                        f"{abbreviate(file_name)} is {scene_name}"
-                    )
-        groups = (
-            (kept_names, "not allowed in a scene, kept in its [names]"),
-            (lost_names, "allowed neither in a scene nor in its [names]"),
-        )
-        for renames, description in reversed(groups):
-            if renames:
-                names_text = ", ".join(renames[:_MAX_NAMES_IN_NOTE]) + (
-                    ", ..." if renames[_MAX_NAMES_IN_NOTE:] else ""
+                    renames[is_kept].append(f"{abbreviate(file_name)} is {scene_name}")
+        for is_kept, listed in renames.items():
+            if listed:
+                description = (
+                    "not allowed in a scene, kept in its [names]"
+                    if is_kept
+                    else "allowed neither in a scene nor in its [names]"
                 )
-                text = f"{len(renames)} {description}: {names_text}"
-                self.notes.insert(
-                    self._name_note_index, ImportNote(self.robot.where, "names", text)
-                )
+                shown = listed[:_MAX_NAMES_IN_NOTE] + ["..."] * (len(listed) > _MAX_NAMES_IN_NOTE)
+                text = f"{len(listed)} {description}: {', '.join(shown)}"
+                note = ImportNote(self.robot.where, "names", text)
+                self.notes.insert(self._name_note_index, note)
 
     def _add_link_notes(self) -> None:
         """Add notes about links that are no separate bodies, and about moving massless links."""
@@ -195,7 +186,12 @@ class _SceneWriter:
     def tables(self, folder: Path | None) -> dict[str, Any]:
         """Keys of the scene."""
         scene_keys: dict[str, Any] = {"gravity": self.robot.gravity}
-        scene_keys["hinge"] = [*map(self._root, self._roots), *self._joints()]
+        roots = [
+            {"name": hinge, "type": self.choices.base, "inboard": GROUND,
+             "outboard": self._bodies[name]}
+            for name, hinge in self._roots.items()
+        ]  # fmt: skip
+        scene_keys["hinge"] = [*roots, *self._joints()]
         parts_by_owner: defaultdict[str, list[tuple[Link, Pose]]] = defaultdict(list)
         for link in self.robot.links:
             owner, pose = self.body_frames[link.name]
@@ -266,24 +262,14 @@ class _SceneWriter:
         if any(center):
             table["center_of_mass"] = center
         if inertia != ZERO_MATRIX:
-            table["inertia"] = (
-                inertia[0][0],
-                inertia[1][1],
-                inertia[2][2],
-                inertia[0][1],
-                inertia[0][2],
-                inertia[1][2],
-            )
+            (xx, xy, xz), (_, yy, yz), (_, _, zz) = inertia
+            table["inertia"] = (xx, yy, zz, xy, xz, yz)
             if message := triangle_message(inertia):
                 table["allow_unphysical_inertia"] = True
                 self._add_note(parts[0][0], f"link {name!r}", f"accepted unchanged: {message}")
         if self._ends[name]:
             table["ends"] = self._ends[name]
         return table
-
-    def _root(self, name: str) -> dict[str, Any]:
-        body, hinge = self._bodies[name], self._roots[name]
-        return {"name": hinge, "type": self.choices.base, "inboard": GROUND, "outboard": body}
 
     def _joints(self) -> Iterator[dict[str, Any]]:
         start = self._initial_values()
@@ -308,11 +294,8 @@ class _SceneWriter:
             law["effort"] = _inertial_mass_efforts(self.joints[joint.name], mass)
         if limits := law.pop("limits", None):
             if self.choices.stop_stiffness is None:
-                self._add_note(
-                    joint,
-                    f"joint {joint.name!r}",
-                    "its limits are not stops; they are kept as rated",
-                )
+                text = "its limits are not stops; they are kept as rated"
+                self._add_note(joint, f"joint {joint.name!r}", text)
             else:
                 law["limits"] = {**limits, "stiffness": self.choices.stop_stiffness}
         if law:
@@ -374,17 +357,14 @@ class _SceneWriter:
                 name = mimics[name].leader
             start_value = start_values[name] if name in start_values else self._initial_value(name)
             for joint_name, mimic in reversed(mimic_path.items()):
-                start_value = start_values[joint_name] = (
-                    mimic.multiplier * start_value + mimic.offset
-                )
+                start_value = mimic.multiplier * start_value + mimic.offset
+                start_values[joint_name] = start_value
         return start_values
 
     def _initial_value(self, name: str) -> float:
         """Initial value of a joint that mimics no other."""
-        initial_values = (
-            self.tree.joints[name].keys.get("initial") if self._is_moving(name) else None
-        )
-        return float(initial_values["q"][0]) if initial_values else 0.0
+        given = self.tree.joints[name].keys.get("initial") if self._is_moving(name) else None
+        return float(given["q"][0]) if given else 0.0
 
     def _shapes(self, folder: Path | None) -> Iterator[dict[str, Any]]:
         meshes = None if folder is None else MeshFinder(folder)
@@ -394,10 +374,8 @@ class _SceneWriter:
             if file := keys.get("file"):
                 mesh_path = None if meshes is None else meshes.path(file)
                 if mesh_path is None:
-                    link = self.tree.links[visual.link]
-                    self._add_note(
-                        link, f"link {visual.link!r}", f"not drawn: there is no mesh {file!r}"
-                    )
+                    link, text = self.tree.links[visual.link], f"there is no mesh {file!r}"
+                    self._add_note(link, f"link {link.name!r}", f"not drawn: {text}")
                     continue
                 keys["file"] = mesh_path
             reference = GROUND if owner == _GROUND_OWNER else self._bodies[owner]
@@ -416,7 +394,6 @@ def _inertial_mass_efforts(hinge: str, mass: float) -> list[str | float]:
 
 def _pose_keys(pose: Pose) -> dict[str, Any]:
     """Keys of a pose: position, and orientation if it is rotated."""
-    is_rotated = pose.rotation != IDENTITY
-    return {"position": pose.position} | (
-        {"orientation": to_quaternion(pose.rotation)} if is_rotated else {}
-    )
+    if pose.rotation == IDENTITY:
+        return {"position": pose.position}
+    return {"position": pose.position, "orientation": to_quaternion(pose.rotation)}

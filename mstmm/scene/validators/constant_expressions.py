@@ -73,11 +73,8 @@ def constant_value(text: str) -> float | None:
     expression = parse_with_constants(text)
     if expression.constant is None or expression.is_condition:
         return None
-    return (
-        WrittenNumber(expression.constant, expression.text)
-        if expression.constants
-        else expression.constant
-    )
+    value = expression.constant
+    return WrittenNumber(value, expression.text) if expression.constants else value
 
 
 def unknown_name_hint(text: str, there: Collection[str] = ()) -> str:

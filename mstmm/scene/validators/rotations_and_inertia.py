@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Annotated, Any
 
 from ...numerics.rotations import (
@@ -95,10 +96,8 @@ def inertia_rule() -> Rule:
             raise problem(
                 f"expected {expected}, or a table of moments and orientation, found {keys}"
             )
-        moments, axes = (
-            entries(value["moments"]),
-            from_orientation(orientation_check.check(value["orientation"])),
-        )
+        moments = entries(value["moments"])
+        axes = from_orientation(orientation_check.check(value["orientation"]))
         xx, yy, zz, xy, xz, yz = (*moments, 0.0, 0.0, 0.0)[:6]
         tensor = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
         return _entries_of_symmetric(product(product(axes, tensor), transpose(axes)))
@@ -172,7 +171,7 @@ _MAX_TRIANGLE_ROUNDING = 1e-6
 _MIN_GYRATION_RADIUS = 1e-8
 
 
-def principal_moments(inertia: Matrix) -> Vector:
+def principal_moments(inertia: Sequence[Sequence[float]]) -> Vector:
     """Eigenvalues of a symmetric 3x3 tensor, ascending (cyclic Jacobi rotations)."""
     a = [list(row) for row in inertia]
     for _ in range(30):  # five suffice; the bound ends the loop where entries are not finite
@@ -206,10 +205,7 @@ def _scaled_moments(inertia: Matrix) -> tuple[Vector, float]:
     largest = max(abs(x) for row in inertia for x in row)
     if largest == 0:
         return (0.0, 0.0, 0.0), 1.0
-    scaled_rows = [[x / largest for x in row] for row in inertia]
-    return principal_moments(
-        (_row(scaled_rows[0]), _row(scaled_rows[1]), _row(scaled_rows[2]))
-    ), largest
+    return principal_moments([[x / largest for x in row] for row in inertia]), largest
 
 
 def _is_definite(m: Matrix) -> bool:
@@ -222,10 +218,6 @@ def _is_definite(m: Matrix) -> bool:
         return False
     pivot = d - b * b / a
     return f - c * c / a - (e - b * c / a) ** 2 / pivot > 0
-
-
-def _row(x: list[float]) -> Vector:
-    return (x[0], x[1], x[2])
 
 
 def is_rounding(entry: float, others: float, mass: float) -> bool:

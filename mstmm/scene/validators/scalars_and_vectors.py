@@ -231,11 +231,8 @@ def _number_from_text(text: str, expected: str, *place: str | int) -> float:
     else:
         if result is not None:
             return result
-        hint = (
-            constant_expressions.unknown_name_hint(text)
-            if is_expression or constant_expressions.current_constants()
-            else hint
-        )
+        if is_expression or constant_expressions.current_constants():
+            hint = constant_expressions.unknown_name_hint(text)
     raise problem(f"expected {expected}, found {describe_value(text)}{hint}", *place)
 
 

@@ -20,13 +20,8 @@ _MAX_SUGGESTION_OPTIONS, _MAX_SUGGESTION_CANDIDATES = 2000, 20
 #: Least similarity of a suggestion, from 0 to 1, of the whole name and of the part that differs.
 _MIN_SIMILARITY = 0.6
 #: Keys reserved for future releases, with their planned content.
-RESERVED_KEYS = {
-    "thermal": "thermal data",
-    "temperature": "thermal data",
-    "import": "imports",
-    "imports": "imports",
-    "include": "imports",
-}
+RESERVED_KEYS = dict.fromkeys(("thermal", "temperature"), "thermal data")
+RESERVED_KEYS |= dict.fromkeys(("import", "imports", "include"), "imports")
 
 #: Other keys that users try for closed loops.
 _LOOP_KEYS = ("loop", "loops", "closure", "closures", "joint", "joints")
@@ -158,13 +153,8 @@ def _unknown_key_message(key: str, model: type[BaseModel], place: Location) -> s
 
 def _keys_of_inner_table(model: type[BaseModel], name: str) -> Iterable[str]:
     """Keys of the table that is the value of a key; none where the value is no single table."""
-    info = model.model_fields.get(name)
-    inner_type = None if info is None else info.annotation
-    return (
-        inner_type.model_fields
-        if isinstance(inner_type, type) and issubclass(inner_type, BaseModel)
-        else ()
-    )
+    inner = model.model_fields[name].annotation if name in model.model_fields else None
+    return inner.model_fields if isinstance(inner, type) and issubclass(inner, BaseModel) else ()
 
 
 def _expected_value(model: type[BaseModel], place: Location) -> str:
@@ -211,15 +201,8 @@ def message_line(place: Location, message: str, data: Any) -> str:
     if len(parts) >= 2 and parts[0] in TABLES and isinstance(parts[1], int):
         table, index = str(parts.pop(0)), int(parts.pop(0))
         label = f"{table} {_element_name(data, table, index)}: "
-    key = ""
-    for part in parts:
-        key += (
-            f"[{part}]"
-            if isinstance(part, int)
-            else f".{_key_text(part)}"
-            if key
-            else _key_text(part)
-        )
+    key = "".join(f"[{x}]" if isinstance(x, int) else f".{_key_text(x)}" for x in parts)
+    key = key.removeprefix(".")
     return f"{label}{key}: {message}" if key else f"{label}{message}"
 
 
