@@ -39,6 +39,14 @@ def finite_float(name: str, value: Any, expected: str = "a finite number") -> fl
     return result
 
 
+def positive_float(name: str, value: Any, meaning: str) -> float:
+    """A finite number above 0; raises SceneError for other values, with its `meaning`."""
+    number = finite_float(name, value, f"{meaning} above 0")
+    if not number > 0:
+        raise SceneError(f"{name} = {number:g}: expected {meaning} above 0")
+    return number
+
+
 def integer(name: str, value: Any, least: int, expected: str) -> int:
     """Validate an integer not below `least`; SceneError for anything else."""
     if isinstance(value, bool | np.bool_) or not isinstance(value, Integral) or value < least:

@@ -83,16 +83,10 @@ def survey_case(
     ]
     survey = Survey(reference_run.trial, distance, runs, _ignore_message)
     survey.run_curves([entry for entry in curves if entry.method in PROMISING], EARLY)
-    survey_result = survey.run_curves(
-        [entry for entry in curves if entry.method not in PROMISING], SETTINGS
-    )
+    survey.run_curves([entry for entry in curves if entry.method not in PROMISING], SETTINGS)
     assert reference_run.trial.numbers is not None
     return OwnRuns(
-        models,
-        reference,
-        reference_run.trial.numbers[-1],
-        survey_result.points,
-        survey_result.skipped,
+        models, reference, reference_run.trial.numbers[-1], survey.points, survey.skipped
     )
 
 

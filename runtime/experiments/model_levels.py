@@ -6,15 +6,14 @@ Bodies that are rigid in the scene stay rigid.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mstmm.array_validation import Array
-from mstmm.ir.hinge_properties import builtin_hinges
+from mstmm.ir.hinge_properties import HingeProperties, builtin_hinges
 from mstmm.numerics.rotations import perpendicular_vector
 from mstmm.scene import Hinge, Names, Scene
 from mstmm.scene.tables.beam import DIRECTIONS, Beam, Modes, Shapes
@@ -81,13 +80,13 @@ def with_model_level(scene: Scene, level: str) -> Scene:
 def limit_modes(scene: Scene, modes: Mapping[str, Modes], n: int, stiffening: bool) -> Scene:
     """The scene with at most n shapes per direction in its flexible bodies."""
     change: dict[str, Any] = {"stiffening": stiffening}
+
+    def limited(beam: Beam, whole: Modes) -> Beam:
+        counts = {direction: min(n, getattr(whole, direction)) for direction in DIRECTIONS}
+        return with_mode_counts(beam, whole, Modes(**counts)).model_copy(update=change)
+
     beams = tuple(
-        with_mode_counts(beam, modes[beam.name], _limited_counts(modes[beam.name], n)).model_copy(
-            update=change
-        )
-        if beam.name in modes
-        else beam
-        for beam in scene.beam
+        limited(beam, modes[beam.name]) if beam.name in modes else beam for beam in scene.beam
     )
     bodies = tuple(
         body.model_copy(update=change | {"modes": min(n, vibration_mode_count(body))})
@@ -130,10 +129,6 @@ def with_tables(scene: Scene, **tables: Any) -> Scene:
         return changed
     names = scene.names.among(BodyReferences(changed.skeleton), changed.hinges.by_name)
     return Scene.model_construct(**(fields | {"names": names}))
-
-
-def _limited_counts(modes: Modes, n: int) -> Modes:
-    return Modes(**{direction: min(n, getattr(modes, direction)) for direction in DIRECTIONS})
 
 
 def vibration_mode_count(body: Elastic) -> int:
@@ -198,7 +193,11 @@ def _planar_hinge(model: CompiledScene, hinge: Hinge, q: Array) -> Hinge | None:
     hinge_q = q[:, model.coordinate_layout.hinges[hinge.name].q_slice]
     axis = _common_axis(hinge_q[:, properties.quaternion + 1 :])
     initial_u = np.array(hinge.initial.u or (0.0,) * len(properties.speeds))
-    if hinge.law != lawless.law or axis is None or not _is_parallel(initial_u[-3:], axis):
+    if hinge.law != lawless.law or axis is None:
+        return None
+    spin = initial_u[-3:]
+    normal = np.linalg.norm(spin - axis * (axis @ spin))
+    if not normal <= _MOTION_TOLERANCE * np.linalg.norm(spin):
         return None
     initial_q, rate = np.array(hinge.initial.q), float(initial_u[-3:] @ axis)
     angle = 2.0 * float(np.arctan2(initial_q[-3:] @ axis, initial_q[-4]))
@@ -206,17 +205,17 @@ def _planar_hinge(model: CompiledScene, hinge: Hinge, q: Array) -> Hinge | None:
               "orientation": hinge.orientation, "position": hinge.position}  # fmt: skip
     if not properties.free_body:
         planar = Hinge(
-            **common, type=_pin_type(), axis=_float_triple(axis),
-            initial=_initial_state([angle], [rate])
+            **common, type=_hinge_type(lambda h: h.axial and h.turns and not h.slides),
+            axis=_float_triple(axis), initial=_initial_state([angle], [rate])
         )  # fmt: skip
-    elif _is_in_plane(hinge_q[:, :3], axis):
+    elif np.abs(hinge_q[:, :3] @ axis).max() <= _MOTION_TOLERANCE * np.abs(hinge_q[:, :3]).max():
         x = np.array(perpendicular_vector(_float_triple(axis)))
         y, velocity = np.cross(axis, x), _rotate(initial_u[:3], axis, angle)
         initial = _initial_state(
             [initial_q[:3] @ x, initial_q[:3] @ y, angle], [velocity @ x, velocity @ y, rate]
         )
         planar = Hinge(
-            **common, type=_planar_hinge_type(), normal=_float_triple(axis),
+            **common, type=_hinge_type(lambda h: h.frame == "plane"), normal=_float_triple(axis),
             axis2=_float_triple(x), initial=initial
         )  # fmt: skip
     else:
@@ -224,28 +223,9 @@ def _planar_hinge(model: CompiledScene, hinge: Hinge, q: Array) -> Hinge | None:
     return planar.model_copy(update={"release": hinge.release})
 
 
-@cache
-def _pin_type() -> str:
-    """Type of the hinge that only rotates about an axis."""
-    hinges = builtin_hinges().items()
-    return next(name for name, hinge in hinges if hinge.axial and hinge.turns and not hinge.slides)
-
-
-@cache
-def _planar_hinge_type() -> str:
-    """Type of the hinge that moves in a plane and rotates about its normal."""
-    return next(name for name, hinge in builtin_hinges().items() if hinge.frame == "plane")
-
-
-def _is_parallel(vector: Array, axis: Array) -> bool:
-    """Whether a vector is parallel to a unit axis."""
-    normal = np.linalg.norm(vector - axis * (axis @ vector))
-    return bool(normal <= _MOTION_TOLERANCE * np.linalg.norm(vector))
-
-
-def _is_in_plane(positions: Array, axis: Array) -> bool:
-    """Whether positions (n, 3) lie in the plane through the origin normal to the axis."""
-    return bool(np.abs(positions @ axis).max() <= _MOTION_TOLERANCE * np.abs(positions).max())
+def _hinge_type(has: Callable[[HingeProperties], object]) -> str:
+    """Type of the built-in hinge with these properties."""
+    return next(name for name, properties in builtin_hinges().items() if has(properties))
 
 
 def _common_axis(vectors: Array) -> Array | None:

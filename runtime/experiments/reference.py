@@ -1,14 +1,15 @@
-"""Reference solution: high-order methods at tight tolerances that must agree.
+"""Reference solution: runs at tight tolerances that must agree.
 
-Every candidate runs at two tolerances or more.  The reference is the run that agrees best with a
-looser run of the same method and with the nearest run of another method; its stated error is the
-larger of these two differences.  If only one candidate completes two runs, the error is their
-difference, and the description says so.
+A chart uses several high-order methods, each at two tolerances or more.  The reference is the run
+that agrees best with a looser run of the same method and with the nearest run of another method;
+its stated error is the larger of these two differences.  If only one candidate completes two runs,
+the error is their difference, and the description says so.  Model reduction uses two runs by one
+method that agree.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -21,7 +22,7 @@ from .error_measure import Measure
 from .method_families import family
 from .runs import Report, Runs
 from .trial import Setting, Trial, max_error
-from .tuning import CHART as TUNING
+from .tuning import CHART, REDUCTION
 
 if TYPE_CHECKING:
     from .simulation import SimulatedScene
@@ -82,6 +83,33 @@ def compute_reference(
     return _select_reference(trials_by_method, measure)
 
 
+def agreeing_runs(
+    run: Callable[[float], Trial],
+    rtol: float,
+    difference: Callable[[Trial, Trial], float],
+    target: float,
+) -> tuple[Trial, Converged]:
+    """Run with tighter tolerances until two runs agree; the tighter one is the reference.
+
+    `run` makes the run of a tolerance, beginning with `rtol`; `target` is the error that the
+    reference has to resolve.  Raises NumericalFailure if the runs do not agree.
+    """
+    looser = run(rtol)
+    while True:
+        tighter_rtol = max(rtol * REDUCTION.reference_ratio, REDUCTION.tightest_rtol)
+        tighter = run(tighter_rtol)
+        error = difference(looser, tighter)
+        if error <= REDUCTION.max_difference * target:
+            return looser, Converged(tighter, error, f"compared with {looser.setting}")
+        if tighter_rtol <= REDUCTION.tightest_rtol:
+            raise NumericalFailure(
+                f"two runs of the richest model with rtol {rtol:.0e} and {tighter_rtol:.0e} differ "
+                f"by {error:.1e}: an error of {target:.1e} cannot be resolved; give an earlier end "
+                "time or a larger target error"
+            )
+        rtol, looser = tighter_rtol, tighter
+
+
 def _run_candidate(
     model: SimulatedScene, name: str, method: str, tolerances: Sequence[float], measure: Measure,
     runs: Runs, report: Report,
@@ -94,10 +122,8 @@ def _run_candidate(
     trials: list[Trial] = []
     for tolerance in tolerances:
         setting = Setting(method, name, tolerance)
-        limit = (
-            runs.budget.remaining(REFERENCE) / 2
-        )  # the other half leaves time for another method
-        if trials and TUNING.reference_growth * trials[-1].cpu_s > limit:
+        limit = runs.budget.remaining(REFERENCE) / 2  # the other half is for another method
+        if trials and CHART.reference_growth * trials[-1].cpu_s > limit:
             return trials, f"{setting} would take too long", True
         report(f"reference by {method}, {setting}")
         trial = runs.trial(model, setting, measure, limit)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mstmm.array_validation import Array, finite_float, integer
+from mstmm.array_validation import Array, integer, positive_float
 from mstmm.defaults import CHART_SAMPLES
 from mstmm.errors import EnvironmentFailure, MstmmError, SceneError
 
@@ -108,9 +108,9 @@ def chart_request(
     if isinstance(quantities, str) or isinstance(methods, str):
         raise SceneError('quantities, methods: expected lists of names, as in ["tip.position"]')
     return ChartRequest(
-        _require_positive("t_end", t_end, "a time in s"), tuple(quantities),
-        require_methods(methods), bool(models), _require_positive("error", error, "an error"),
-        _require_positive("budget", budget, "a time in s"),
+        positive_float("t_end", t_end, "a time in s"), tuple(quantities),
+        require_methods(methods), bool(models), positive_float("error", error, "an error"),
+        positive_float("budget", budget, "a time in s"),
         integer(
             "samples", CHART_SAMPLES if samples is None else samples, 2,
             "a whole number of samples, 2 or more",
@@ -118,13 +118,6 @@ def chart_request(
         samples is not None,
         integer("rounds", rounds, 0, "a whole number of rounds, 0 or more"),
     )  # fmt: skip
-
-
-def _require_positive(name: str, value: float, meaning: str) -> float:
-    number = finite_float(name, value, f"{meaning} above 0")
-    if not number > 0 or not math.isfinite(number):
-        raise SceneError(f"{name} = {number:g}: expected {meaning} above 0")
-    return number
 
 
 def make_chart(
@@ -161,7 +154,7 @@ class _ChartBuilder:
     def chart(self, title: str) -> Chart:
         request = self.request
         variants = model_levels(self.model.scene) if request.models else ()
-        richest = self._richest_model(variants)
+        richest = self.compile(variants[-1].scene) if variants else self.model
         start = richest.simulate(0.0, method="dop853")
         measure = select_measure(richest, start, request.quantities, request.models)
         self.report_status(self.budget.plan(len(request.methods) * max(1, len(variants))))
@@ -169,39 +162,34 @@ class _ChartBuilder:
         if not request.fixed:
             self._refine_times(richest, name)
         best = compute_reference(richest, name, measure, self.runs, self.report)
+        q = best.trial.trajectory.q
+        motion = q.max(axis=0) - q.min(axis=0)
+        is_static = bool((motion <= _MOTION_TOLERANCE * np.maximum(1.0, abs(q[0]))).all())
         reference = Reference(
             best.error, best.made_by, name, measure.name, measure.unit, measure.scaling,
-            best.trial.ended, _is_static(best.trial.trajectory.q),
+            best.trial.ended, is_static,
         )  # fmt: skip
         self._report_reference(reference)
         curves = self._curves(variants, richest, best, measure, reference)
-        if reference.is_static:
-            curves = []
         survey = Survey(best.trial, measure, self.runs, self.report)
-        survey.run_curves([curve for curve in curves if curve.method in PROMISING], EARLY)
-        surveyed = survey.run_curves(
-            [curve for curve in curves if curve.method not in PROMISING], SETTINGS
-        )
+        if not is_static:
+            survey.run_curves([curve for curve in curves if curve.method in PROMISING], EARLY)
+            others = [curve for curve in curves if curve.method not in PROMISING]
+            survey.run_curves(others, SETTINGS)
         points, missed = repeat_timings(
-            surveyed.points, surveyed.models, request.rounds, self.runs, self.report
+            survey.points, survey.models, request.rounds, self.runs, self.report
         )
         if missed and request.rounds:
-            reason = (
-                f"{missed} of {len(points)} runs were timed less often than the others, for lack "
-                "of time"
-            )
-            self.skipped.append(Skipped("", "", "", reason, False))
+            reason = f"{missed} of {len(points)} runs were timed less often than the others, for"
+            self.skipped.append(Skipped("", "", "", f"{reason} lack of time", False))
         level_errors = {
-            level.name: level.error
-            for level in self.model_levels
-            if level.error is not None and level.name != reference.model
+            level.name: level.error for level in self.model_levels[:-1] if level.error is not None
         }
-        points_with_bounds, common_warnings = split_warnings(
-            bound_errors(points, reference, level_errors)
-        )
+        bounded = bound_errors(points, reference, level_errors)
+        points_with_bounds, common_warnings = split_warnings(bounded)
         return Chart(
             title, request.t_end, len(self.times.times), reference, points_with_bounds,
-            tuple(self.model_levels), (*self.skipped, *surveyed.skipped), request.error,
+            tuple(self.model_levels), (*self.skipped, *survey.skipped), request.error,
             request.budget, self.budget.elapsed_time, self.times.description,
             (*scene_warnings(richest.scene), *common_warnings),
         )  # fmt: skip
@@ -229,10 +217,6 @@ class _ChartBuilder:
         if reference.is_static:
             self.report_status("the scene has no degrees of freedom: no methods are compared")
 
-    def _richest_model(self, variants: Sequence[Variant]) -> SimulatedScene:
-        """Model of the richest level; compiled like the other levels if there are any."""
-        return self.compile(variants[-1].scene) if variants else self.model
-
     def _curves(
         self,
         variants: Sequence[Variant],
@@ -244,11 +228,9 @@ class _ChartBuilder:
         """Curves of all methods on all model levels, the richest level last."""
         models: list[tuple[str, SimulatedScene, float | None]] = []
         others = list(variants[:-1])
-        if (
-            variants
-            and (planar := planar_level(variants[-1], richest, best.trial.trajectory.q)) is not None
-        ):
-            others.append(planar)
+        if variants:
+            planar = planar_level(variants[-1], richest, best.trial.trajectory.q)
+            others += [] if planar is None else [planar]
         for variant in others:
             evaluated = self._evaluate_level(variant, best, measure)
             if evaluated is not None:
@@ -259,15 +241,9 @@ class _ChartBuilder:
         self.model_levels.append(
             Level(reference.model, reference.error, _degrees_of_freedom(richest), richest.engine)
         )
+        t_end, floor = self.request.t_end, reference.smallest_resolved_error
         return [
-            method_curve(
-                method,
-                level,
-                model,
-                self.request.t_end,
-                reference.smallest_resolved_error,
-                level_error,
-            )
+            method_curve(method, level, model, t_end, floor, level_error)
             for method in self.request.methods
             for level, model, level_error in models
         ]
@@ -323,13 +299,6 @@ class _ChartBuilder:
 def _degrees_of_freedom(model: SimulatedScene) -> int:
     """Number of degrees of freedom; of a mechanism, its mobility."""
     return model.nu if model.loop_start is None else model.loop_start.loops.mobility
-
-
-def _is_static(q: Array) -> bool:
-    """Whether no coordinate moves; q is (n, nq)."""
-    return bool(
-        (q.max(axis=0) - q.min(axis=0) <= _MOTION_TOLERANCE * np.maximum(1.0, abs(q[0]))).all()
-    )
 
 
 #: Times closer together than this fraction of the run are merged.

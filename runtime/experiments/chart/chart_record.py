@@ -10,6 +10,7 @@ from typing import Any
 
 from mstmm.array_validation import finite_float
 from mstmm.errors import MstmmError, NumericalFailure, SceneError
+from mstmm.plain_data import to_plain
 
 from ..trial import Setting
 
@@ -109,10 +110,7 @@ class Level:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, as in chart.json."""
-        return {
-            "name": self.name, "error": self.error,
-            "degrees_of_freedom": self.degrees_of_freedom, "engine": self.engine,
-        }  # fmt: skip
+        return to_plain(self)
 
 
 @dataclass(frozen=True)

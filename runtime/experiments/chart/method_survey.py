@@ -6,24 +6,20 @@ one, so that a lack of time drops the most accurate settings and no whole method
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from ...run import external_integrators
 from ..error_measure import Measure
 from ..method_families import settings
-from ..runs import Runs
+from ..runs import Report, Runs
 from ..trial import Setting, Trial, max_error
 from ..tuning import CHART as TUNING
 from .chart_record import Point, Skipped
 
 if TYPE_CHECKING:
     from ..simulation import SimulatedScene
-
-
-#: Reason why a curve ends before its last setting.
-_NO_TIME = "too little time left"
 
 
 @dataclass
@@ -41,6 +37,10 @@ class Curve:
     sufficiency_reason: str
     next_settings: Iterator[Setting]
     costs: list[float] = field(default_factory=list)
+
+    def skipped(self, setting: str, reason: str, is_unsupported: bool = False) -> Skipped:
+        """Record of settings of this curve that are not run."""
+        return Skipped(self.method, self.level, setting, reason, is_unsupported)
 
     @property
     def expected_seconds(self) -> float:
@@ -73,33 +73,30 @@ def method_curve(
 
 
 @dataclass
-class SurveyResult:
-    """Points of a survey, the model of each point, and what was skipped."""
+class Survey:
+    """Runs of curves within a time budget.
 
+    Attributes:
+        reference, measure: run that errors are relative to, and their measure.
+        runs: runs within the time budget.
+        report: callback with a sentence before every run.
+        points, models: points so far, and the model of each.
+        skipped: settings that were not run.
+    """
+
+    reference: Trial
+    measure: Measure
+    runs: Runs
+    report: Report
     points: list[Point] = field(default_factory=list)
     models: list[SimulatedScene] = field(default_factory=list)
     skipped: list[Skipped] = field(default_factory=list)
 
-
-class Survey:
-    """Run of all curves within a time budget; collects points in `result`."""
-
-    def __init__(
-        self, reference: Trial, measure: Measure, runs: Runs, tell: Callable[[str], None]
-    ) -> None:
-        self.reference, self.measure, self.runs, self.report = reference, measure, runs, tell
-        self.result = SurveyResult()
-
-    def run_curves(self, curves: list[Curve], part: float) -> SurveyResult:
+    def run_curves(self, curves: list[Curve], part: float) -> None:
         """Run all curves, one setting of each in turn, until this part of the budget is spent."""
         while curves:
-            waiting = len(curves)
-            curves = [
-                curve
-                for curve in curves
-                if self._run_next(curve, self.runs.budget.run_limit(part, waiting))
-            ]
-        return self.result
+            waiting, budget = len(curves), self.runs.budget
+            curves = [c for c in curves if self._run_next(c, budget.run_limit(part, waiting))]
 
     def _run_next(self, curve: Curve, limit: float) -> bool:
         """Run the next setting of a curve within `limit` s; return False if the curve ends."""
@@ -107,41 +104,29 @@ class Survey:
         if setting is None:
             return False
         if not limit or curve.expected_seconds > limit:
-            self._skip(curve, f"{setting} and tighter", _NO_TIME)
+            self.skipped.append(curve.skipped(f"{setting} and tighter", "too little time left"))
             return False
         self.report(f"{curve.level}: {curve.method}, {setting}")
         trial = self.runs.trial(curve.model, setting, self.measure, limit)
-        if (
-            not curve.costs
-            and trial.numbers is not None
-            and _may_include_loading(trial, curve.model)
-        ):
+        # The CPU time of a first call may include loading or compiling the method.
+        may_load = trial.cpu_s < TUNING.loading_limit or curve.model.engine != "looped"
+        if not curve.costs and trial.numbers is not None and may_load:
             trial = self.runs.trial(curve.model, setting, self.measure, limit)
         curve.costs.append(trial.cpu_s)
         if trial.refused:
-            self._skip(curve, "", trial.failure, refused=True)
+            self.skipped.append(curve.skipped("", trial.failure, is_unsupported=True))
             return False
         point = chart_point(trial, self.reference, self.measure)
-        self.result.points.append(point)
-        self.result.models.append(curve.model)
-        return not (trial.late or self._is_accurate_enough(curve, point))
-
-    def _is_accurate_enough(self, curve: Curve, point: Point) -> bool:
-        """Whether tighter settings cannot show smaller errors; skips the next one if so."""
-        if point.error is None or point.error > curve.sufficient_error:
-            return False
+        self.points.append(point)
+        self.models.append(curve.model)
+        if trial.late or point.error is None or point.error > curve.sufficient_error:
+            return not trial.late
+        # Tighter settings cannot show smaller errors.
         following = next(curve.next_settings, None)
         if following is not None:
-            self._skip(curve, f"{following} and tighter", curve.sufficiency_reason)
-        return True
-
-    def _skip(self, curve: Curve, setting: str, reason: str, refused: bool = False) -> None:
-        self.result.skipped.append(Skipped(curve.method, curve.level, setting, reason, refused))
-
-
-def _may_include_loading(trial: Trial, model: SimulatedScene) -> bool:
-    """Whether the CPU time of a first call may include loading or compiling the method."""
-    return trial.cpu_s < TUNING.loading_limit or model.engine != "looped"
+            reason = curve.sufficiency_reason
+            self.skipped.append(curve.skipped(f"{following} and tighter", reason))
+        return False
 
 
 def chart_point(trial: Trial, reference: Trial, measure: Measure) -> Point:
@@ -153,12 +138,11 @@ def chart_point(trial: Trial, reference: Trial, measure: Measure) -> Point:
         return Point(trial.setting, failure=reason)
     counts = trial.trajectory.statistics
     # External integrators do not count their factorised tangent matrices.
-    is_counted = counts is not None and trial.setting.method not in external_integrators.METHODS
+    is_external = trial.setting.method in external_integrators.METHODS
     return Point(
-        trial.setting, error, trial.cpu_s, 1,
-        None if counts is None else counts.evaluations, counts.tangents if is_counted else None,
-        None if counts is None else counts.steps,
-        warnings=trial.warnings, is_too_coarse=trial.too_coarse,
+        trial.setting, error, trial.cpu_s, 1, counts.evaluations,
+        None if is_external else counts.tangents, counts.steps, warnings=trial.warnings,
+        is_too_coarse=trial.too_coarse,
     )  # fmt: skip
 
 
@@ -166,11 +150,7 @@ def chart_point(trial: Trial, reference: Trial, measure: Measure) -> Point:
 
 
 def repeat_timings(
-    points: list[Point],
-    models: list[SimulatedScene],
-    rounds: int,
-    runs: Runs,
-    report: Callable[[str], None],
+    points: list[Point], models: list[SimulatedScene], rounds: int, runs: Runs, report: Report
 ) -> tuple[list[Point], int]:
     """Repeat the timing of points; return them, and how many missed at least one round.
 

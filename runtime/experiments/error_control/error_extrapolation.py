@@ -165,7 +165,10 @@ def next_rtol(runs: Sequence[ToleranceRun], target: float, kind: Kind) -> float:
     elif not runs[-2].distance < _PARAMETERS[kind].divergence:
         factor = TUNING.max_diverged_ratio
         if kind is Kind.EXPLICIT and runs[-2].divergence_fraction < 1.0:
-            ratio = _rtol_without_divergence(runs[-2], target) / last.rtol
+            # Tolerance at which a run should not diverge, at the error growth of the diverged run.
+            before, power = runs[-2], _PARAMETERS[kind].power
+            share = TUNING.target_share * target / (before.rtol * _error_growth(before))
+            ratio = before.rtol * min(share, 1.0) ** (1 / power) / last.rtol
             factor = min(max(ratio, TUNING.min_diverged_ratio), TUNING.max_diverged_ratio)
     else:
         share = TUNING.target_share if kind is Kind.EXPLICIT else TUNING.target_share_others
@@ -179,21 +182,14 @@ def next_rtol(runs: Sequence[ToleranceRun], target: float, kind: Kind) -> float:
 def _factor_by_local_errors(last: ToleranceRun, target: float) -> float:
     """Ratio of the next tolerance to the last one, from the sum of its local errors."""
     parameters = _PARAMETERS[last.kind]
-    factor = float(
-        (parameters.target_share * target / _error_by_local_errors(last))
-        ** (1 / parameters.sum_power)
-    )
+    local_sum = last.local_error_sum or TUNING.sum_per_rtol * last.rtol
+    growth = parameters.limited_growth if last.is_stability_limited else parameters.growth
+    error = local_sum * (last.growth or growth + TUNING.growth_per_radian * last.radians)
+    factor = float((parameters.target_share * target / error) ** (1 / parameters.sum_power))
     if not last.calm:
         return factor
     is_near = last.rtol <= TUNING.near_target * target
     return max(factor, TUNING.min_calm_ratio if is_near else TUNING.min_calm_ratio_far)
-
-
-def _rtol_without_divergence(before: ToleranceRun, target: float) -> float:
-    """Tolerance at which a run should not diverge, at the error growth of a diverged run."""
-    parameters = _PARAMETERS[before.kind]
-    share = TUNING.target_share * target / (before.rtol * _error_growth(before))
-    return before.rtol * min(share, 1.0) ** (1 / parameters.power)
 
 
 def _error_growth(run: ToleranceRun) -> float:
@@ -230,14 +226,6 @@ def no_gain_reason(runs: Sequence[ToleranceRun]) -> str:
     if runs[-1].rtol < 2 * TIGHTEST:  # runs at nearly the same tolerance show no difference
         return f"tolerances below {TIGHTEST:.0e} are below rounding"
     return f"target not reached in {TUNING.max_runs} runs" if len(runs) >= TUNING.max_runs else ""
-
-
-def _error_by_local_errors(run: ToleranceRun) -> float:
-    """Estimated error of a run from its local errors."""
-    parameters = _PARAMETERS[run.kind]
-    local_sum = run.local_error_sum or TUNING.sum_per_rtol * run.rtol
-    growth = parameters.limited_growth if run.is_stability_limited else parameters.growth
-    return local_sum * (run.growth or growth + TUNING.growth_per_radian * run.radians)
 
 
 def _error_power(runs: Sequence[ToleranceRun]) -> float:

@@ -67,11 +67,8 @@ def method_kind(method: str) -> Kind:
 
 def is_stability_limited(run: Trajectory) -> bool:
     """Whether stability limited a significant share of the steps of a run."""
-    statistics = run.statistics
-    return (
-        statistics is not None
-        and statistics.stability_limited_steps > TUNING.limited_share * statistics.steps
-    )
+    limited_steps = run.statistics.stability_limited_steps
+    return limited_steps > TUNING.limited_share * run.statistics.steps
 
 
 def damps_own_errors(run: Trajectory) -> bool:
@@ -88,14 +85,6 @@ def _fastest_possible(model: CompiledScene) -> float:
         shape_rate = TUNING.free_shape_factor * math.sqrt(max(squares, default=0.0))
         _fastest_rates[model] = max(shape_rate, fastest_possible(model.scene))
     return _fastest_rates[model]
-
-
-def _may_be_stiff(run: Trajectory) -> bool:
-    """Whether stability limited a run so much that `auto` should make the next one."""
-    statistics = run.statistics
-    if run.methods or statistics is None:
-        return False
-    return statistics.stability_limited and statistics.steps > TUNING.stiff_steps
 
 
 class Family:
@@ -134,10 +123,8 @@ class Family:
 
     def leaves(self, run: Trajectory) -> bool:
         """Whether the explicit steps of a run do not resolve the fastest motion, if it is known."""
-        vibration, statistics = self._known_vibration, run.statistics
-        return (
-            vibration is not None and statistics is not None and vibration.outruns(statistics.steps)
-        )
+        vibration = self._known_vibration
+        return vibration is not None and vibration.outruns(run.statistics.steps)
 
     @cached_property
     def radians(self) -> float:
@@ -148,10 +135,10 @@ class Family:
 
     def calm(self, run: Trajectory) -> bool:
         """Whether the motions that the steps of a run do not resolve are below the target error."""
-        vibration, statistics = self._known_vibration, run.statistics
-        if vibration is None or statistics is None:
+        vibration = self._known_vibration
+        if vibration is None:
             return False
-        return 0.0 < vibration.unresolved_amplitude(statistics.steps) < self._error
+        return 0.0 < vibration.unresolved_amplitude(run.statistics.steps) < self._error
 
     @property
     def _known_vibration(self) -> Vibration | None:
@@ -221,8 +208,10 @@ class Family:
             return _EXPONENTIAL
         if kind is Kind.IMPLICIT:
             return implicit_method(rtol)
-        if made and self._vibration is None and _may_be_stiff(made[-1]):
-            return AUTO
+        if made and self._vibration is None and not made[-1].methods:
+            statistics = made[-1].statistics  # stability may have set the steps of a stiff scene
+            if statistics.stability_limited and statistics.steps > TUNING.stiff_steps:
+                return AUTO
         prefers_damping = self._prefers_damping
         if not made:
             return _LOOSE_EXPLICIT if prefers_damping else AUTO_EXPLICIT

@@ -107,9 +107,13 @@ class ToleranceSearch:
         max_steps = (
             self._settings.max_steps if self._completed else self._family.max_first_steps(method)
         )
+        first_step = 0.0  # the default, which may be equal at all tolerances: runs share its error
+        if self._completed:
+            smallest_step = self._completed[-1].trajectory.statistics.smallest_step
+            first_step = TUNING.first_step_ratio * (smallest_step or 0.0)
         settings = replace(
             self._settings, rtol=rtol, atol=atol, method=method, max_steps=max_steps,
-            first_step=self._first_step(),
+            first_step=first_step,
         )  # fmt: skip
         monitor = RunMonitor(self._run_progress(), settings)
         start = time.process_time()
@@ -125,14 +129,6 @@ class ToleranceSearch:
         self._completed.append(Trial(setting, cpu_s, run, self._compared_values(run)))
         self._add_tolerance_run()
         return None
-
-    def _first_step(self) -> float:
-        """First step (s) of the next run; 0 for the default one in the first run.
-
-        The default may be equal at all tolerances, so that compared runs would share its error.
-        """
-        statistics = self._completed[-1].trajectory.statistics if self._completed else None
-        return TUNING.first_step_ratio * ((statistics and statistics.smallest_step) or 0.0)
 
     def _compared_values(self, run: Trajectory) -> Array:
         """Compared values of a run; for coordinates without creating a result."""
@@ -154,7 +150,7 @@ class ToleranceSearch:
         self._tolerance_runs.append(
             ToleranceRun(
                 settings.rtol, kind, 0.0,
-                None if statistics is None else statistics.sum_of_local_errors,
+                statistics.sum_of_local_errors,
                 is_stability_limited(run), self._family.radians if kind is Kind.IMPLICIT else 0.0,
                 kind is Kind.EXPLICIT and self._family.calm(run), self._error_growth(last, kind),
                 method=settings.method,
@@ -329,8 +325,7 @@ def _round_tolerance(tolerance: float) -> float:
 def _record(trial: Trial, distance: float | None = None) -> ErrorControlRun:
     """Record of a trial for the result, with its distance to the tightest one."""
     settings, statistics = trial.trajectory.settings, trial.trajectory.statistics
-    evaluations = 0 if statistics is None else statistics.evaluations + statistics.residuals
     return ErrorControlRun(
-        settings.method, settings.rtol, settings.atol, distance, evaluations, trial.cpu_s,
-        trial.failure,
+        settings.method, settings.rtol, settings.atol, distance,
+        statistics.evaluations + statistics.residuals, trial.cpu_s, trial.failure,
     )  # fmt: skip

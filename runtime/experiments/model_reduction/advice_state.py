@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mstmm.array_validation import finite_float, integer
+from mstmm.array_validation import finite_float, integer, positive_float
 from mstmm.errors import MstmmError, SceneError
 
 from ...integrate.steppers import AUTO
@@ -175,31 +174,17 @@ def advice_request(
     t_end: float, error: float, of: str | Sequence[str], budget: float, samples: int, rounds: int
 ) -> Request:
     """Validate the arguments of `mstmm.advise`; SceneError names the first invalid one."""
-    quantities = _require_names(of)
+    quantities = (of,) if isinstance(of, str) else of
+    if not isinstance(quantities, Sequence) or not all(isinstance(x, str) for x in quantities):
+        raise SceneError(f"of = {of!r:.60}: expected the name of a quantity, or a list of names")
     target_error = finite_float("error", error, "an error above 0")
     is_relative = len(quantities) != 1  # a single quantity has a unit, and no upper limit
-    is_positive = target_error > 0 and math.isfinite(target_error)
-    if not is_positive or (is_relative and target_error >= 1):
+    if not target_error > 0 or (is_relative and target_error >= 1):
         limits = "above 0 and below 1" if is_relative else "above 0, in the unit of the quantity"
         raise SceneError(f"error = {target_error:g}: expected an error {limits}, such as 1e-3")
     return Request(
-        _require_positive_time("t_end", t_end), target_error, quantities,
-        _require_positive_time("budget", budget),
+        positive_float("t_end", t_end, "a time in s"), target_error, tuple(quantities),
+        positive_float("budget", budget, "a time in s"),
         integer("samples", samples, 2, "a whole number of samples, 2 or more"),
         integer("rounds", rounds, 0, "a whole number of rounds, 0 or more"),
     )  # fmt: skip
-
-
-def _require_names(of: str | Sequence[str]) -> tuple[str, ...]:
-    if isinstance(of, str):
-        return (of,)
-    if not isinstance(of, Sequence) or not all(isinstance(name, str) for name in of):
-        raise SceneError(f"of = {of!r:.60}: expected the name of a quantity, or a list of names")
-    return tuple(of)
-
-
-def _require_positive_time(name: str, value: float) -> float:
-    time = finite_float(name, value, "a time in s above 0")
-    if not time > 0 or not math.isfinite(time):
-        raise SceneError(f"{name} = {time:g}: expected a time in s above 0")
-    return time

@@ -27,7 +27,7 @@ from .body_models import (
     given_body_model,
 )
 from .method_selection import SelectedSetting, compare_cpu_times, whole_run_tolerance
-from .search import Choices, ModelSearch
+from .search import ModelSearch
 
 if TYPE_CHECKING:
     from mstmm.scene.tables.beam import Beam
@@ -53,12 +53,23 @@ def build_advice(
     model_saving, setting_saving = _savings(state, selected)
     given = _given_scene_if_better(state, selected, model_saving)
     if given is not None:
-        selected, bodies, state.parts = given, _bodies_as_given(state, evidence), {}
+        reason = "stays as it is: a smaller model of the scene is slower and less accurate"
+        given_models = {name: _given_model(state, name) for name in state.unsplit_models}
+        bodies = tuple(
+            BodyAdvice(name, model, model, None, None, reason, evidence.get(name))
+            for name, model in given_models.items()
+        )
+        selected, state.parts = given, {}
         model_saving, setting_saving = _savings(state, selected)
     else:
+        undeformed = {  # bodies that do not deform in the plane of motion
+            name: BodyModel(RIGID)
+            for name in state.unsplit_models
+            if name not in state.bodies.richest and name not in state.parts.values()
+        }
         bodies = tuple(
             _body_advice(state, name, choice, evidence.get(name), search)
-            for name, choice in {**_undeformed_bodies(state), **choices}.items()
+            for name, choice in {**undeformed, **choices}.items()
         )
     changes = state.change_texts.get(selected.trial.name, state.change_texts[base])
     if not bodies:
@@ -82,13 +93,10 @@ def build_advice(
         tuple(state.notes),
         tuple(
             TriedModel(
-                tried.name,
-                tried.error if math.isfinite(tried.error) else None,
-                tried.cpu_s,
+                tried.name, tried.error if math.isfinite(tried.error) else None, tried.cpu_s,
                 tried.reason,
             )
-            for tried in bench.results
-            if math.isfinite(tried.cpu_s)
+            for tried in bench.results if math.isfinite(tried.cpu_s)
         ),
     )  # fmt: skip
 
@@ -121,18 +129,6 @@ def _given_scene_if_better(
             f"{scene.error:.1e}"
         )
     return given
-
-
-def _bodies_as_given(
-    state: AdviceState, evidence: Mapping[str, ErrorPrediction]
-) -> tuple[BodyAdvice, ...]:
-    """Advice to keep every flexible body as it is in the scene."""
-    models = {name: _given_model(state, name) for name in state.unsplit_models}
-    reason = "stays as it is: a smaller model of the scene is slower and less accurate"
-    return tuple(
-        BodyAdvice(name, model, model, None, None, reason, evidence.get(name))
-        for name, model in models.items()
-    )
 
 
 def _comparison_text(state: AdviceState, selected: SelectedSetting) -> str:
@@ -177,15 +173,6 @@ def _body_advice(
     return BodyAdvice(
         name, _given_model(state, name), choice, error, saving, reason, prediction, split
     )
-
-
-def _undeformed_bodies(state: AdviceState) -> Choices:
-    """Rigid models of the bodies that do not deform in the plane of motion."""
-    return {
-        name: BodyModel(RIGID)
-        for name in state.unsplit_models
-        if name not in state.bodies.richest and name not in state.parts.values()
-    }
 
 
 def _given_model(state: AdviceState, name: str) -> BodyModel:

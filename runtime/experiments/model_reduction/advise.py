@@ -136,12 +136,18 @@ def _select_setting(
     available = state.remaining_target
     if best.error > TUNING.accurate_error * available and choices != state.bodies.richest:
         search.try_choices(search.richer(choices))
+
+    def time_factor(tried: TrialResult) -> float:
+        is_accurate = tried.error <= TUNING.accurate_error * state.request.error
+        return TUNING.accurate_time_factor if is_accurate else TUNING.time_factor
+
     others = sorted(
         (
             tried
             for tried in state.runner.results
             if search.choices_by_name.get(tried.name, choices) != choices
-            and _may_be_cheapest(state, tried, best)
+            and tried.error <= state.error_budget
+            and tried.cpu_s <= time_factor(tried) * best.cpu_s
         ),
         key=lambda tried: tried.cpu_s,
     )
@@ -168,9 +174,3 @@ def _select_setting(
     except NumericalFailure:  # keep the setting of the trial runs
         setting = Setting(AUTO, best.name, state.runner.rtol)
         return SelectedSetting(best, Point(setting, best.error / growth, best.cpu_s, 1))
-
-
-def _may_be_cheapest(state: AdviceState, tried: TrialResult, best: TrialResult) -> bool:
-    is_accurate = tried.error <= TUNING.accurate_error * state.request.error
-    factor = TUNING.accurate_time_factor if is_accurate else TUNING.time_factor
-    return tried.error <= state.error_budget and tried.cpu_s <= factor * best.cpu_s

@@ -94,7 +94,12 @@ def _split_beam(split: SplitScene, beam: Beam, count: int) -> SplitScene:
     # Index of the part next to the root of the tree: the welds point away from it.
     inboard_part = 0 if inboard_hinge is None else part_index[inboard_hinge.outboard_end or ROOT]
     renamed = with_references(scene, moved)
-    welds = [_part_weld(scene, *pair, k < inboard_part) for k, pair in enumerate(pairwise(parts))]
+    welds = []
+    for k, (near, far) in enumerate(pairwise(parts)):
+        ends = (f"{near}.{TIP}", f"{far}.{ROOT}")
+        inboard, outboard = reversed(ends) if k < inboard_part else ends
+        weld = _unused_name(f"{near}_to_{far}", scene)
+        welds.append(Hinge(name=weld, type="fixed", inboard=inboard, outboard=outboard))
     tables: dict[str, Any] = {
         "load": tuple(
             part for load in renamed.load for part in _part_loads(load, beam, parts, part_length)
@@ -117,14 +122,6 @@ def _split_beam(split: SplitScene, beam: Beam, count: int) -> SplitScene:
         with_tables(renamed, **tables), {**split.names, **moved},
         {**split.parts, **dict.fromkeys(parts, beam.name)},
     )  # fmt: skip
-
-
-def _part_weld(scene: Scene, near: str, far: str, inward: bool) -> Hinge:
-    """Weld between two parts; `inward` if the root of the tree is at the far part."""
-    ends = (f"{near}.{TIP}", f"{far}.{ROOT}")
-    inboard, outboard = reversed(ends) if inward else ends
-    name = _unused_name(f"{near}_to_{far}", scene)
-    return Hinge(name=name, type="fixed", inboard=inboard, outboard=outboard)
 
 
 def _beam_part(beam: Beam, name: str, start: float, end: float, end_names: Collection[str]) -> Beam:

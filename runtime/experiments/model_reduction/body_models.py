@@ -23,7 +23,6 @@ from ..model_levels import beam_modes, vibration_mode_count, with_mode_counts, w
 from ..tuning import REDUCTION as TUNING
 
 if TYPE_CHECKING:
-    from ...engine.compiled_scene import CompiledScene
     from ...flexible.modal_body import ModalBody
     from ...result.result import Result
 
@@ -70,7 +69,8 @@ class BodyModel:
         counts = {**dict(self.shapes), direction: count}
         keep_zero = direction == VIBRATION  # static shapes remain without vibration shapes
         shapes = [pair for pair in counts.items() if pair[1] or keep_zero]
-        shapes.sort(key=lambda pair: _direction_index(pair[0]))
+        order = (*DIRECTIONS, VIBRATION)
+        shapes.sort(key=lambda pair: order.index(pair[0]))
         return BodyModel(self.level, tuple(shapes))
 
     def __str__(self) -> str:
@@ -84,10 +84,6 @@ def _count_text(direction: str, count: int) -> str:
     if direction != VIBRATION:
         return f"{count} {direction}"
     return f"static + {count} vibration" if count else "static only"
-
-
-def _direction_index(direction: str) -> int:
-    return DIRECTIONS.index(direction) if direction in DIRECTIONS else len(DIRECTIONS)
 
 
 class Bodies:
@@ -220,24 +216,17 @@ def body_predictions(result: Result, reach: float) -> dict[str, ErrorPrediction]
     predictions = {}
     for name, body in bodies.items():
         if name in ranges:
-            eta = np.abs(_modal_coordinates(result, name))
-            loaded = _loaded_ends(result.model, name)
-            predictions[name] = _body_prediction(body, result.t, eta, ranges[name], loaded, reach)
+            eta = (
+                np.asarray(result.response(name).eta) if isinstance(result, OneWayResult)
+                else result.q[:, model.coordinate_layout.modal[name].q_slice]
+            )  # fmt: skip
+            attached = [hinge.inboard for hinge in model.scene.hinge]
+            attached += [chain.inboard for chain in model.scene.chain]
+            loaded = {end for part, end in map(split_reference, attached) if part == name}
+            predictions[name] = _body_prediction(
+                body, result.t, np.abs(eta), ranges[name], loaded, reach
+            )
     return predictions
-
-
-def _modal_coordinates(result: Result, name: str) -> Array:
-    """(n, modes) modal coordinates."""
-    if isinstance(result, OneWayResult):
-        return np.asarray(result.response(name).eta)
-    return result.q[:, result.model.coordinate_layout.modal[name].q_slice]
-
-
-def _loaded_ends(model: CompiledScene, name: str) -> set[str]:
-    """Ends of a body that are the inboard end of a hinge or chain."""
-    inboard = [hinge.inboard for hinge in model.scene.hinge]
-    inboard += [chain.inboard for chain in model.scene.chain]
-    return {end for body, end in map(split_reference, inboard) if body == name}
 
 
 def _body_prediction(

@@ -71,8 +71,8 @@ def cheapest_setting(
             method_curve(method, tried.name, model, bench.span.t_end, enough, model_error)
             for method in PROMISING
         ]
-    surveyed = survey.run_curves(curves, EARLY)
-    points = bound_errors(surveyed.points, reference)
+    survey.run_curves(curves, EARLY)
+    points = bound_errors(survey.points, reference)
     sufficient = [
         i
         for i, point in enumerate(points)
@@ -85,7 +85,7 @@ def cheapest_setting(
     fastest, others = order[: TUNING.repeated_settings], order[TUNING.repeated_settings :]
     repeated = [*fastest, *(i for i in others if points[i].model == smallest_name)]
     repeated = repeated[: 2 * TUNING.repeated_settings]
-    models = [surveyed.models[i] for i in repeated]
+    models = [survey.models[i] for i in repeated]
     timed, _ = repeat_timings([points[i] for i in repeated], models, rounds, runs, bench.report)
     best = recommend(timed, target_error, reference)
     of_smallest = [point for point in timed if point.model == smallest_name]

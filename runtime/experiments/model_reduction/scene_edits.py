@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -94,17 +94,13 @@ def _rename_in_value(value: Any, names: tuple[Mapping[str, str], Mapping[str, st
         return _rename_in_expression(value, names)
     if isinstance(value, tuple):
         renamed = tuple(_rename_in_value(item, names) for item in value)
-        return renamed if _is_changed(renamed, value) else value
+        return renamed if any(a is not b for a, b in zip(renamed, value, strict=True)) else value
     if hasattr(type(value), "model_fields"):
         old = {key: getattr(value, key) for key in type(value).model_fields}
         new = {key: _rename_in_value(item, names) for key, item in old.items()}
         changed = {key: item for key, item in new.items() if item is not old[key]}
         return value.model_copy(update=changed) if changed else value
     return value
-
-
-def _is_changed(new: Iterable[Any], old: Iterable[Any]) -> bool:
-    return any(a is not b for a, b in zip(new, old, strict=True))
 
 
 def _rename_in_expression(
@@ -222,11 +218,20 @@ def with_load_axes(scene: Scene, removed_body: str, axes: str, rotation: Matrix)
 
     `rotation` (3, 3) is the orientation of the axes of the removed body in the new ones.
     """
+
+    def body_of_axes(load: Load) -> str:
+        return split_reference(load.on)[0] if load.axes == OWN_AXES else load.axes
+
+    def rotated(load: Load) -> Load:
+        update: dict[str, Any] = {"axes": axes}
+        for key in ("force", "moment"):
+            update[key] = tuple(_combined_component(row, getattr(load, key)) for row in rotation)
+        return load.model_copy(update=update)
+
     return with_tables(
         scene,
         load=tuple(
-            _rotated_load(load, axes, rotation) if _axes_body(load) == removed_body else load
-            for load in scene.load
+            rotated(load) if body_of_axes(load) == removed_body else load for load in scene.load
         ),
     )
 
@@ -255,17 +260,6 @@ def with_ends_at_mass_centers(scene: Scene) -> Scene:
             if load.at == MASS_CENTER and load.on in ends else load for load in scene.load
         ),
     )  # fmt: skip
-
-
-def _axes_body(load: Load) -> str:
-    return split_reference(load.on)[0] if load.axes == OWN_AXES else load.axes
-
-
-def _rotated_load(load: Load, axes: str, rotation: Matrix) -> Load:
-    update: dict[str, Any] = {"axes": axes}
-    for key in ("force", "moment"):
-        update[key] = tuple(_combined_component(row, getattr(load, key)) for row in rotation)
-    return load.model_copy(update=update)
 
 
 def _combined_component(row: Sequence[float], entries: Entries) -> Expression:

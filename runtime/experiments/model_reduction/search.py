@@ -182,7 +182,12 @@ class ModelSearch:
             while is_reduced:
                 is_reduced = False
                 for choice in self._smaller_choices(name, choices[name]):
-                    if (name, choice) in self.failed_models or not self._is_promising(name, choice):
+                    estimate = self.expected_error(name, choice)
+                    is_one_way = choice.level == ONE_WAY
+                    factor = TUNING.max_one_way_estimate if is_one_way else TUNING.max_estimate
+                    if estimate is not None and estimate > factor * self.allowed_error:
+                        continue
+                    if (name, choice) in self.failed_models:
                         continue
                     if not self._has_time():
                         self.skipped = self.skipped or order[k:]
@@ -194,11 +199,6 @@ class ModelSearch:
                         break
                     self.failed_models.add((name, choice))
         return choices, best
-
-    def _is_promising(self, name: str, choice: BodyModel) -> bool:
-        estimate = self.expected_error(name, choice)
-        factor = TUNING.max_one_way_estimate if choice.level == ONE_WAY else TUNING.max_estimate
-        return estimate is None or estimate <= factor * self.allowed_error
 
     def _smaller_choices(self, name: str, choice: BodyModel) -> Iterator[BodyModel]:
         """Models smaller than a given one, the smallest first."""

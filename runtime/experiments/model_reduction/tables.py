@@ -12,9 +12,10 @@ def summary_lines(advice: Advice) -> list[str]:
     target = (
         f"for an error of {advice.target_error:.2g}{unit} of {advice.measure}{advice.scaling_text}"
     )
+    model = "a reduced scene" if advice.is_reduced else "the scene as it is"
     exceeded = "" if advice.error <= advice.target_error else ", LARGER than the target error"
     lines = [
-        f"{target}: {_model_text(advice)} by {advice.method}, {advice.setting}: error "
+        f"{target}: {model} by {advice.method}, {advice.setting}: error "
         f"{advice.error:.1e}{exceeded}, {format_time(advice.cpu_s)} CPU over "
         f"{advice.comparison_text}"
     ]
@@ -42,12 +43,6 @@ def _factor_text(saving: float) -> str:
     if saved == "1" or lost == "1":
         return "the same"
     return f"saves a factor of {saved}" if saving > 1 else f"costs a factor of {lost}"
-
-
-def _model_text(advice: Advice) -> str:
-    if not advice.is_reduced:
-        return "the scene as it is"
-    return "a reduced scene"
 
 
 def body_table(advice: Advice) -> Table:

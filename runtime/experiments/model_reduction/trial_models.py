@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
@@ -17,6 +18,7 @@ from mstmm.scene import Scene
 from ...integrate.steppers import AUTO
 from ..budget import Budget
 from ..error_measure import Measure
+from ..reference import agreeing_runs
 from ..runs import Compile, Report, Runs
 from ..trial import Setting, Trial, max_error
 from ..tuning import REDUCTION as TUNING
@@ -114,14 +116,15 @@ def choose_window(
     return ComparisonWindow(max(min(fraction, 1.0), TUNING.probe_fraction) * t_end, t_end)
 
 
+@dataclass
 class TrialRunner:
     """Runner of trial models: compares them with the reference, and keeps the results.
 
     Attributes:
         span: compared time span.
-        measure: error measure, scaled by the reference.
+        samples: number of times at which models are compared.
         budget: time limit.
-        runs: runs over the time span.
+        measure: error measure, scaled by the reference.
         compile: function that compiles a scene.
         report: callback with a sentence before every run.
         rtol: relative tolerance of trial runs.
@@ -129,26 +132,25 @@ class TrialRunner:
         reference: run of the richest model.
         floor: difference of two runs of the richest model.
         late: models that exceeded their time limit.
+        runs: runs over the time span.
     """
 
-    def __init__(
-        self,
-        span: ComparisonWindow,
-        samples: int,
-        budget: Budget,
-        measure: Renaming,
-        compile: Compile,
-        tell: Report,
-    ) -> None:
-        self.span, self.measure, self.budget = span, measure, budget
-        self.runs = Runs(span.t_end, np.linspace(0.0, span.t_end, samples), budget)
-        self.compile, self.report = compile, tell
-        self.rtol = TUNING.loosest_rtol
-        self.names: Mapping[str, str] = {}
-        self.reference: Trial
-        self.floor = 0.0
-        self.late: list[str] = []
-        self._results: dict[str, TrialResult] = {}
+    span: ComparisonWindow
+    samples: int
+    budget: Budget
+    measure: Renaming
+    compile: Compile
+    report: Report
+    rtol: float = TUNING.loosest_rtol
+    names: Mapping[str, str] = field(default_factory=dict)
+    reference: Trial = field(init=False)
+    floor: float = 0.0
+    late: list[str] = field(default_factory=list)
+    _results: dict[str, TrialResult] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        times = np.linspace(0.0, self.span.t_end, self.samples)
+        self.runs = Runs(self.span.t_end, times, self.budget)
 
     def make_reference(
         self, scene: Scene, model: SimulatedScene, name: str, asked: float, part: float
@@ -158,25 +160,16 @@ class TrialRunner:
         `asked` is the target error, `part` relative to the size of the motion.  Raises
         NumericalFailure if they do not agree.
         """
-        self.rtol = initial_rtol(part)
-        run = self._run_richest(model, name, self.rtol)
-        while True:
-            tighter_rtol = max(self.rtol * TUNING.reference_ratio, TUNING.tightest_rtol)
-            tighter = self._run_richest(model, name, tighter_rtol)
+
+        def difference(run: Trial, tighter: Trial) -> float:
             self.measure.set_scales(tighter.values)
-            difference = self.distance(run, tighter)
-            if difference <= TUNING.max_difference * asked:
-                break
-            if tighter_rtol <= TUNING.tightest_rtol:
-                raise NumericalFailure(
-                    f"two runs of the richest model with rtol {self.rtol:.0e} and "
-                    f"{tighter_rtol:.0e} differ by {difference:.1e}: an error of {asked:.1e} "
-                    "cannot be resolved; give an earlier end time or a larger target error"
-                )
-            self.rtol, run = tighter_rtol, tighter
-        self.reference, self.floor = tighter, difference
-        tried = self._store_result(name, scene, model, run)
-        return replace(tried, error=difference)
+            return self.distance(run, tighter)
+
+        run, best = agreeing_runs(
+            partial(self._run_richest, model, name), initial_rtol(part), difference, asked
+        )
+        self.rtol, self.reference, self.floor = run.setting.value, best.trial, best.error
+        return replace(self._store_result(name, scene, model, run), error=best.error)
 
     def finer(self, scene: Scene, names: Mapping[str, str], name: str) -> Trial:
         """Run a model that is richer than the richest one, such as one with split beams.
@@ -184,11 +177,19 @@ class TrialRunner:
         `names` are its names of bodies and ends.  Raises MstmmError if it cannot be compiled; a
         failure of the run is part of the trial.
         """
+        return self._trial(name, scene, names)[1]
+
+    def _trial(
+        self, name: str, scene: Scene, names: Mapping[str, str],
+        still: Mapping[str, Vector] | None = None,
+    ) -> tuple[SimulatedScene, Trial]:  # fmt: skip
+        """Compiled model of a scene, and its run."""
         self.report(name)
         model = self.compile(scene)
-        self.measure.register(model, names)
+        self.measure.register(model, names, still)
         limit = self.budget.remaining() * TUNING.model_budget
-        return self.runs.trial(model, Setting(AUTO, name, self.rtol), self.measure, limit)
+        setting = Setting(AUTO, name, self.rtol)
+        return model, self.runs.trial(model, setting, self.measure, limit)
 
     def distance(self, a: Trial, b: Trial) -> float:
         """Difference of two runs, extrapolated to the whole run; inf if unknown."""
@@ -209,49 +210,36 @@ class TrialRunner:
         `names`: former name of a body or end -> its name in the scene, by default as in the scene
         of the reference; `still`: name -> fixed position on the ground, m.
         """
-        if name not in self._results:
-            self.report(name)
-            self._results[name] = self._run_model(name, scene, names, still)
-        return self._results[name]
+        if name in self._results:
+            return self._results[name]
+        try:
+            model, trial = self._trial(name, scene, self.names if names is None else names, still)
+        except MstmmError as problem:
+            failed = TrialResult(name, scene, None, math.inf, math.inf, str(problem))
+            return self._results.setdefault(name, failed)
+        if trial.late:
+            self.late.append(name)
+        return self._store_result(name, scene, model, trial)
 
     @property
     def results(self) -> tuple[TrialResult, ...]:
         """Results of all trials, in their order."""
         return tuple(self._results.values())
 
-    def _run_model(
-        self, name: str, scene: Scene, names: Mapping[str, str] | None,
-        still: Mapping[str, Vector] | None,
-    ) -> TrialResult:  # fmt: skip
-        try:
-            model = self.compile(scene)
-            self.measure.register(model, self.names if names is None else names, still)
-        except MstmmError as problem:
-            return TrialResult(name, scene, None, math.inf, math.inf, str(problem))
-        limit = self.budget.remaining() * TUNING.model_budget
-        trial = self.runs.trial(model, Setting(AUTO, name, self.rtol), self.measure, limit)
-        if trial.late:
-            self.late.append(name)
-        return self._store_result(name, scene, model, trial)
-
     def _store_result(
         self, name: str, scene: Scene, model: SimulatedScene, trial: Trial
     ) -> TrialResult:
+        """Keep the result of a trial; of a short run the smallest of several CPU times."""
         if trial.numbers is None:
             tried = TrialResult(name, scene, None, math.inf, trial.cpu_s, trial.failure)
         else:
             error, reason = max_error(trial, self.reference, self.measure)
-            cpu_s = self._min_cpu_s(model, trial)
+            cpu_s, left, calls = trial.cpu_s, self.budget.remaining(), TUNING.repeats - 1
+            if cpu_s < TUNING.short_run:
+                cpu_s = min(cpu_s, self.runs.cpu_s(model, trial.setting, left, calls) or cpu_s)
             tried = TrialResult(name, scene, model, error * self.span.growth, cpu_s, reason)
         self._results[name] = tried
         return tried
-
-    def _min_cpu_s(self, model: SimulatedScene, trial: Trial) -> float:
-        """CPU time of a run, s; for a short run the smallest of several."""
-        if trial.cpu_s >= TUNING.short_run:
-            return trial.cpu_s
-        again = self.runs.cpu_s(model, trial.setting, self.budget.remaining(), TUNING.repeats - 1)
-        return trial.cpu_s if again is None else min(trial.cpu_s, again)
 
     def is_as_cheap(self, one: TrialResult, other: TrialResult) -> bool:
         """Whether a model is not slower than another, within the scatter of timings.

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from mstmm.numerics.rotations import ZERO, Matrix, Pose, Vector, from_orientation
-from mstmm.scene import Body, Chain, Hinge, Load, Scene, Spring, split_reference
+from mstmm.scene import Body, Chain, Hinge, Scene, Spring, split_reference
 from mstmm.scene.validators.scalars_and_vectors import GROUND
 
 from ...packing.rigid_substitution import substitute_rigid_bodies
@@ -163,9 +163,10 @@ def _removable_body(
     if not weld.is_weld or weld.is_released or weld.name in referenced.hinges:
         return None
     pair = (weld.outboard_body, weld.inboard_body)
-    if any(name != GROUND and not _is_rigid(bodies.get(name)) for name in pair):
+    if any(name not in bodies or bodies[name].type != RIGID for name in {*pair} - {GROUND}):
         return None
-    if any(_end_bodies(spring) == {*pair} and _is_user_defined(spring) for spring in scene.spring):
+    # User-defined force elements may act between ends of one body.
+    if any(_end_bodies(s) == {*pair} and s.type != "spring" for s in scene.spring):
         return None
     if any(_end_bodies(bushing) & {*pair} - {GROUND} for bushing in scene.bushing):
         return None  # the axes of a bushing are those of its ends
@@ -195,15 +196,6 @@ def _spoils_loop(weld: Hinge, scene: Scene) -> bool:
         any(hinge.outboard_body == part for hinge in other_hinges)
         or any(part in _end_bodies(constraint) for constraint in scene.constraint)
     )
-
-
-def _is_rigid(body: Body | None) -> bool:
-    return body is not None and body.type == RIGID
-
-
-def _is_user_defined(spring: Spring) -> bool:
-    """Whether it is a user-defined force element, which may act between ends of one body."""
-    return spring.type != "spring"
 
 
 # --- removal of one weld ------------------------------------------------------------------------
@@ -255,18 +247,13 @@ def _record_removal(
     """The merged scene after one more body has been removed."""
     into = {body: whole if target == part else target for body, target in merged.carriers.items()}
     former = {old: names.get(new, new) for old, new in merged.names.items()}
-    idle = [spring for spring in scene.spring if _is_on_one_body(spring)]
+    idle = [spring for spring in scene.spring if len(_end_bodies(spring)) == 1]
     return replace(
         merged,
         scene=with_tables(scene, spring=tuple(s for s in scene.spring if s not in idle)),
         names={**former, **names}, carriers={**into, part: whole},
         idle=(*merged.idle, *(f'spring "{spring.name}"' for spring in idle)),
     )  # fmt: skip
-
-
-def _is_on_one_body(spring: Spring) -> bool:
-    """Whether both ends of a spring are on the same body, or on the ground."""
-    return len(_end_bodies(spring)) == 1
 
 
 # --- merging into the ground --------------------------------------------------------------------
@@ -276,13 +263,20 @@ def _merge_into_ground(
     merged: MergedScene, scene: Scene, removed: str, poses: Mapping[str, Pose]
 ) -> MergedScene:
     """Merge a body into the ground; `poses` are those of its origin and ends on the ground."""
-    idle = [load for load in scene.load if _acts_on(load, removed)]
+    idle = [load for load in scene.load if split_reference(load.on)[0] == removed]
     changed = with_tables(
         scene,
         body=tuple(body for body in scene.body if body.name != removed),
         hinge=tuple(_attached_to_ground(hinge, hinge.rotation, poses) for hinge in scene.hinge),
         chain=tuple(
-            _attached_to_ground(chain, _first_rotation(chain), poses) for chain in scene.chain
+            _attached_to_ground(
+                chain,
+                chain.hinge[0].rotation
+                if chain.orientation is None
+                else from_orientation(chain.orientation),
+                poses,
+            )
+            for chain in scene.chain
         ),
         spring=tuple(_spring_to_ground(spring, poses) for spring in scene.spring),
         load=tuple(load for load in scene.load if load not in idle),
@@ -296,16 +290,6 @@ def _merge_into_ground(
     return replace(
         after, fixed_points={**merged.fixed_points, **still}, idle=(*idle_loads, *after.idle)
     )
-
-
-def _acts_on(load: Load, body: str) -> bool:
-    return split_reference(load.on)[0] == body
-
-
-def _first_rotation(chain: Chain) -> Matrix:
-    """Rotation matrix of the first hinge of a chain."""
-    orientation = chain.orientation
-    return chain.hinge[0].rotation if orientation is None else from_orientation(orientation)
 
 
 def _attached_to_ground(element: Any, rotation: Matrix, poses: Mapping[str, Pose]) -> Any:
