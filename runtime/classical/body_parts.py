@@ -15,7 +15,7 @@ from mstmm.array_validation import Array
 
 from ..engine.looped_engine import Probe
 from ..flexible.modal_body import ModalBody
-from ..flexible.modal_port import ModalPort
+from ..flexible.modal_parts import ModalPort
 from ..packing.expansion import HELD
 from ..packing.packed_scene import PackedScene
 from .supported_elements import Springs, hinge_kinds, unsupported_error

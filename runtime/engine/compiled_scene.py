@@ -12,8 +12,7 @@ from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure, SceneError
 from mstmm.scene import Scene
 
-from ..flexible.modal_body import ModalBody
-from ..flexible.modal_scales import modal_sizes, radius_of_gyration
+from ..flexible.modal_body import ModalBody, modal_sizes, radius_of_gyration
 from ..kernels import kernel_store
 from ..kernels.prebuilt_kernels import Known
 from ..packing import scene_parameters as named_parameters

@@ -11,17 +11,21 @@ undeformed body.  SI units; eta of bending and axial shapes in metres, of twist 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cache
+from importlib.resources import files
+from typing import TypeVar
 
 import numpy as np
 
 from mstmm.array_validation import Array, Integers
+from mstmm.errors import SceneError
+from mstmm.ir import KernelIR
+from mstmm.ir.element_spec import kernel_from_json
 
 from .beam.section_ports import BeamShapes
-from .mass_moments import Moments
-from .modal_port import MassPoint, ModalPort
-from .truncation import Truncation
+from .modal_parts import MassPoint, ModalPort, Moments, Truncation
 
 
 @dataclass(frozen=True)
@@ -76,3 +80,158 @@ class ModalBody(Moments):
     def Mff(self) -> Array:
         """Modal mass matrix (n, n), with the frame fixed."""
         return np.einsum("aakl->kl", self.F)
+
+
+# --- scales ---------------------------------------------------------------------------------------
+
+
+def modal_sizes(body: ModalBody) -> Array:
+    """Characteristic modal amplitudes (n,), the smaller of two per mode.
+
+    At one of them some section turns by 1 rad, at the other the mass moves (rms) by the radius of
+    gyration of the body.
+    """
+    radius = radius_of_gyration(body) or 1.0
+    displacement = np.sqrt(np.abs(np.diag(body.Mff)) / max(float(body.mass), 1e-300))
+    rotation = np.max([np.abs(port.theta).max(axis=0) for port in body.ports.values()], axis=0)
+    if body.shapes is not None:
+        sections = body.shapes.values_at(np.linspace(0.0, body.shapes.length, 2 * body.n + 3)).theta
+        rotation = np.maximum(rotation, np.abs(sections).max(axis=(0, 1)))
+    return np.asarray(1.0 / np.maximum(np.maximum(displacement / radius, rotation), 1e-300))
+
+
+def radius_of_gyration(body: ModalBody) -> float:
+    """Radius of gyration about the origin of the floating frame, m."""
+    return float(np.sqrt(np.trace(body.second) / max(float(body.mass), 1e-300)))
+
+
+# --- kernel inputs, and changes of frame ----------------------------------------------------------
+
+_PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
+#: (a, b) with eps_iab = 1, by i.
+_CYCLIC = ((1, 2), (2, 0), (0, 1))
+
+
+def moment_inputs(body: Moments) -> dict[str, Array]:
+    """Inputs p, C, P, B, Z_xx.., Y_x.., G_x.., M of the kernels of ("sweep", "modal").
+
+    They are defined in `derive.flexible.modal_symbols`.
+    """
+    e, f, g, x = body.E, body.F, body.G, body.X
+    inputs = {
+        "p": np.array([body.mass, *body.first, *(body.second[a, b] for a, b in _PAIRS)]),
+        "C": body.C,
+        "P": np.array([e[a, b] - e[b, a] for a, b in _CYCLIC]),
+        "B": np.array([e[a, b] + e[b, a] for a, b in _PAIRS]),
+    }
+    for a, b in _PAIRS:
+        name = "xyz"[a] + "xyz"[b]
+        inputs[f"Z_{name}"] = f[a, b] + f[a, b].T - x[a, b] - x[b, a]
+    for i, (a, b) in enumerate(_CYCLIC):
+        inputs[f"Y_{'xyz'[i]}"] = (f[a, b] - x[a, b]) - (f[b, a] - x[b, a])
+    for i in range(3):
+        inputs[f"G_{'xyz'[i]}"] = g[i]
+    inputs["M"] = f[0, 0] + f[1, 1] + f[2, 2]
+    return inputs
+
+
+def section_inputs(port: ModalPort) -> dict[str, Array]:
+    """Inputs r, phi, theta, g_x .. h_z of the kernel "section" of ("sweep", "modal")."""
+    names = [f"{kind}_{axis}" for kind in "gh" for axis in "xyz"]
+    return {"r": port.position, "phi": port.phi, "theta": port.theta} | dict(
+        zip(names, port.second_order, strict=True)
+    )
+
+
+M = TypeVar("M", bound=Moments)
+
+
+def transform_body(body: ModalBody, rotation: Array, origin: Array) -> ModalBody:
+    """Body in other axes about another origin.
+
+    `rotation` (3, 3) turns new axes to old ones; `origin` (3,) is in old axes, m.
+    """
+    axes, shift = rotation, origin
+    if np.array_equal(axes, np.eye(3)) and not np.any(shift):
+        return body
+    return replace(
+        _transform_moments(body, axes, shift),
+        ports={name: transform_section(port, axes, shift) for name, port in body.ports.items()},
+        points=tuple(
+            replace(point, port=transform_section(point.port, axes, shift)) for point in body.points
+        ),
+        drag=None if body.drag is None else _transform_moments(body.drag, axes, shift),
+    )
+
+
+def _transform_moments(body: M, rotation: Array, origin: Array) -> M:
+    """Moments about another origin, in the axes `rotation`."""
+    first = body.first - body.mass * origin
+    second = body.second - np.outer(origin, body.first) - np.outer(first, origin)
+    e = body.E - origin[:, None, None] * body.C[None]
+    x = body.X - origin[:, None, None, None] * body.G[None]
+    return replace(
+        body,
+        first=rotation.T @ first,
+        second=rotation.T @ second @ rotation,
+        C=rotation.T @ body.C,
+        E=np.einsum("ia,jb,ijk->abk", rotation, rotation, e),
+        F=np.einsum("ia,jb,ijkl->abkl", rotation, rotation, body.F),
+        G=_rotate_components(rotation, body.G),
+        X=np.einsum("ia,jb,ijkl->abkl", rotation, rotation, x),
+    )
+
+
+def transform_section(port: ModalPort, rotation: Array, origin: Array) -> ModalPort:
+    """Section in other axes about another origin; arguments as in `transform_body`."""
+    r = rotation
+    return ModalPort(
+        r.T @ (port.position - origin), r.T @ port.rotation, r.T @ port.phi, r.T @ port.theta,
+        np.concatenate([_rotate_components(r, part) for part in np.split(port.second_order, 2)]),
+    )  # fmt: skip
+
+
+def _rotate_components(rotation: Array, vectors: Array) -> Array:
+    """Components (3, n, n) in the axes `rotation`."""
+    return np.asarray(np.einsum("ia,ikl->akl", rotation, vectors))
+
+
+def without_mass(body: ModalBody) -> ModalBody:
+    """Body with stiffness and damping alone, for a body whose mass sits in points."""
+    zeros = {name: np.zeros_like(getattr(body, name)) for name in "CEFGX"}
+    return replace(body, mass=0.0, first=np.zeros(3), second=np.zeros((3, 3)), **zeros)
+
+
+@cache
+def kernel(name: str) -> KernelIR:
+    """Kernel of the element "modal" with the given name."""
+    text = files("mstmm.generated").joinpath("sweep_modal.json").read_text(encoding="utf-8")
+    return kernel_from_json(text, name)
+
+
+# --- rejection of bodies that cannot be computed in double precision ------------------------------
+
+
+def checked_result(what: str, make: Callable[[], ModalBody]) -> ModalBody:
+    """Body that `make` returns.
+
+    Raises SceneError naming `what`, such as 'beam "b"', for a singular matrix or an overflow.
+    """
+    try:
+        with np.errstate(all="ignore"):
+            body = make()
+    except np.linalg.LinAlgError as failure:
+        raise _precision_error(what, str(failure).lower()) from None
+    ports = [values for port in body.ports.values() for values in vars(port).values()]
+    arrays = [body.second, body.C, body.E, body.F, body.G, body.X, body.K, body.D, *ports]
+    if not all(np.isfinite(values).all() for values in arrays):
+        raise _precision_error(what, "overflow")
+    return body
+
+
+def _precision_error(what: str, why: str) -> SceneError:
+    return SceneError(
+        f"{what}: its shapes and masses cannot be computed in double precision ({why}); look for "
+        "masses, stiffnesses or lengths that differ by too many orders of magnitude, or use fewer "
+        "shapes"
+    )

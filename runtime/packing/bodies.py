@@ -12,14 +12,14 @@ from mstmm.scene import Body, Hinge
 from mstmm.scene.checks.topology import BodyRow, Topology
 from mstmm.scene.tables.hinge_frames import hinge_frames, parameters_from_keys
 
-from ..flexible.kernel_inputs import (
+from ..flexible.modal_body import (
+    ModalBody,
     moment_inputs,
     section_inputs,
     transform_body,
     transform_section,
     without_mass,
 )
-from ..flexible.modal_body import ModalBody
 from ..kernels.prebuilt_kernels import Elements, declared_numbers
 from . import internal_frames
 from .coordinate_layout import HingeSlots, Layout

@@ -36,7 +36,7 @@ from mstmm.scene.tables.loads import Load
 from mstmm.scene.validators.scalars_and_vectors import GROUND
 
 from ..flexible.modal_body import ModalBody
-from ..flexible.modal_port import MassPoint, ModalPort
+from ..flexible.modal_parts import MassPoint, ModalPort
 from ..kernels.prebuilt_kernels import Element
 from .coordinate_layout import OF_CONSTRAINT
 from .rigid_substitution import RigidSubstitution, scale_expression

@@ -33,7 +33,7 @@ from mstmm.scene.tables.hinge_frames import initial_motion_axes
 from mstmm.scene.tables.scene_tables import rigid_body_of_beam
 
 from ..flexible.modal_body import ModalBody
-from ..flexible.modal_port import ModalPort
+from ..flexible.modal_parts import ModalPort
 
 if TYPE_CHECKING:
     from mstmm.scene import Hinge

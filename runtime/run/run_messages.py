@@ -17,8 +17,7 @@ from ..engine.failure_messages import (
     find_nonfinite_expression,
 )
 from ..engine.looped_engine import LoopedEngine
-from ..flexible.mass_definiteness import is_definite_at
-from ..flexible.support_motion import Supports
+from ..flexible.mass_definiteness import Supports, is_definite_at
 from ..integrate.c_loop import Integrator, Status
 from ..integrate.steppers import get
 from ..packing.packed_scene import PackedScene

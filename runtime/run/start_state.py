@@ -18,8 +18,7 @@ from ..engine.static_equilibrium import (
     UndeterminedEquilibriumError,
     find_determined_equilibrium,
 )
-from ..flexible.modal_body import ModalBody
-from ..flexible.modal_scales import modal_sizes
+from ..flexible.modal_body import ModalBody, modal_sizes
 from ..packing.coordinate_layout import HingeSlots, start_values
 from .scene_system import SceneSystem
 

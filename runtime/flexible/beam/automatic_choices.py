@@ -34,10 +34,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..mass_definiteness import SLOPE
-from .beam_data import BeamData
+from .beam_data import BeamData, Frame
 from .boundary_conditions import BoundaryConditions
-from .expression_shapes import ExpressionShape
-from .frame_location import Frame
 from .shape_bases import (
     CLAMPED_FREE,
     FREE_FREE,
@@ -47,6 +45,7 @@ from .shape_bases import (
     Basis,
     static_count,
 )
+from .shape_functions import ExpressionShape
 from .static_shapes import direction_stiffness
 
 if TYPE_CHECKING:

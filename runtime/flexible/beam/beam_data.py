@@ -105,3 +105,16 @@ def _snap_to_break(x: float, breaks: tuple[float, ...]) -> float:
     """Position of an end, moved to a break that differs only by rounding."""
     nearest = min(breaks, key=lambda place: abs(place - x))
     return nearest if abs(nearest - x) <= 1e-9 * breaks[-1] else float(min(max(x, 0.0), breaks[-1]))
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Location of the floating frame in one direction: "tangent" at `x` (m), "chord" or "mean"."""
+
+    kind: str
+    x: float = 0.0
+
+    @property
+    def origin(self) -> float | None:
+        """Section (m) without axial displacement and twist; None for the mean frame."""
+        return {"tangent": self.x, "chord": 0.0, "mean": None}[self.kind]

@@ -13,11 +13,10 @@ import numpy as np
 from mstmm.array_validation import Array
 from mstmm.errors import SceneError
 
-from ..mass_moments import Moments
-from ..modal_port import MassPoint
+from ..modal_parts import MassPoint, Moments
 from . import beam_kernels
+from .beam_kernels import Row, Term, Terms, add_products, kernel_terms, known_factor, shape_rows
 from .gauss_quadrature import gauss_rule
-from .multilinear import Row, Term, Terms, add_products, kernel_terms, known_factor, shape_rows
 from .section_ports import BeamShapes, without_noise
 from .shape_fields import DIRECTIONS
 

@@ -16,7 +16,7 @@ from mstmm.scene.tables.loads import Load, Spring
 from mstmm.scene.validators.scalars_and_vectors import split_reference
 
 from .beam_data import BeamData
-from .restraint import restrained_beams
+from .planar_motion import restrained_beams
 from .static_shapes import direction_stiffness
 
 if TYPE_CHECKING:

@@ -15,8 +15,7 @@ import numpy as np
 from mstmm.array_validation import Array
 from mstmm.errors import SceneError
 
-from .beam_data import BeamData
-from .frame_location import Frame
+from .beam_data import BeamData, Frame
 from .gauss_quadrature import gauss_points, shape_density
 from .shape_fields import Mode
 from .shape_functions import Shape, ShiftedShape

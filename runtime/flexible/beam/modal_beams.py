@@ -13,11 +13,9 @@ from mstmm.errors import SceneError
 from mstmm.scene.tables.beam import Modes
 from mstmm.scene.tables.loads import Load
 
-from ..cache_key import CacheKey
-from ..mass_definiteness import is_definite_with_first_shape, is_mass_definite
-from ..modal_body import ModalBody
-from ..numerical_checks import checked_result
-from ..support_motion import Support, Supports
+from ..mass_definiteness import Support, Supports, is_definite_with_first_shape, is_mass_definite
+from ..modal_body import ModalBody, checked_result
+from ..modal_parts import CacheKey
 from .automatic_choices import (
     BENDING,
     DirectionChoice,

@@ -9,10 +9,8 @@ import numpy as np
 
 from mstmm.array_validation import Array
 
-from ..memory_chunks import chunk_slices
-from ..modal_port import ModalPort
-from .beam_data import BeamData
-from .frame_location import Frame
+from ..modal_parts import ModalPort, chunk_slices
+from .beam_data import BeamData, Frame
 from .gauss_quadrature import gauss_points
 from .second_order import SecondOrder
 from .shape_fields import Mode, ShapeFields

@@ -14,8 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from .beam_data import BeamData
-from .expression_shapes import ExpressionShape
-from .shape_functions import Eigenfunction, Shape, Sine
+from .shape_functions import Eigenfunction, ExpressionShape, Shape, Sine
 from .static_shapes import (
     bending_eigenfunctions,
     bending_static_shapes,

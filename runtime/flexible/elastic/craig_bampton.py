@@ -24,8 +24,7 @@ from mstmm.array_validation import Array
 
 from ..resolution import resolved_frequency, ritz_frequencies
 from .finite_element_model import ElasticModel
-from .interface_nodes import Port
-from .interface_reduction import Clamped, Sections, twist_transform
+from .interface_nodes import Clamped, Port, Sections, twist_transform
 
 FRAMES = ("tangent", "mean")
 

@@ -22,20 +22,15 @@ from mstmm.scene.tables.hinge_frames import initial_motion_axes
 from mstmm.scene.validators.scalars_and_vectors import GROUND, split_reference
 
 from ...platform_support.subprocesses import run_in_subprocess
-from ..cache_key import CacheKey
-from ..mass_definiteness import is_definite_with_first_shape, is_mass_definite
-from ..modal_body import ModalBody
-from ..modal_port import ModalPort
-from ..numerical_checks import checked_result
-from ..support_motion import Supports
+from ..mass_definiteness import Supports, is_definite_with_first_shape, is_mass_definite
+from ..modal_body import ModalBody, checked_result
+from ..modal_parts import CacheKey, ModalPort
 from .craig_bampton import Reduction, Release, reduce, resolution
-from .field_moments import field_moments
 from .finite_element_model import ElasticModel
-from .geometric_stiffness import SecondOrder, second_order_moments, truncation
 from .interface_nodes import Port, check_separate_nodes, select_port
-from .matrices import from_arrays, load_matrices, save_matrices
-from .matrix_checks import check_matrices
+from .matrices import check_matrices, from_arrays, load_matrices, save_matrices
 from .mesh import Material, box_mesh, check_element_count, mesh_model, read_mesh
+from .shape_moments import SecondOrder, field_moments, second_order_moments, truncation
 from .surface_mesh import skin
 
 if TYPE_CHECKING:

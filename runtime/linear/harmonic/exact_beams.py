@@ -25,7 +25,7 @@ from ...engine.tangent_matrix import Complex, DynamicStiffnessBodies, TangentMat
 from ...flexible.beam.beam_data import BeamData, beam_data
 from ...flexible.beam.boundary_conditions import BeamEnvironment, boundary_conditions
 from ...flexible.beam.dynamic_stiffness import BENDING, HarmonicBeam, harmonic_beam
-from ...flexible.kernel_inputs import transform_body
+from ...flexible.modal_body import transform_body
 from ...packing.scene_parameters import scene_data, scene_from_data
 from ..frozen_loads import with_frozen_loads
 from ..input_channels import GROUND, Channel, channel

@@ -13,7 +13,7 @@ from mstmm.risk import Risk
 
 from ...flexible.beam.beam_data import beam_data
 from ...flexible.beam.boundary_conditions import BeamEnvironment, boundary_conditions
-from ...flexible.beam_resolution import beam_resolution
+from ...flexible.resolution import beam_resolution
 
 if TYPE_CHECKING:
     from ...engine.compiled_scene import CompiledScene

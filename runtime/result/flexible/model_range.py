@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from mstmm.array_validation import Array
 from mstmm.scene.checks.flexible_bodies import beam_lines
 
-from ...flexible.memory_chunks import chunk_slices
-from ...flexible.modal_scales import radius_of_gyration
+from ...flexible.modal_body import radius_of_gyration
+from ...flexible.modal_parts import chunk_slices
 from . import range_estimators as e
 from .lateral_buckling import lateral_load_ratio, quadrature_rule
 from .modal_energy import modal_energy, modal_frequencies, strain_energy

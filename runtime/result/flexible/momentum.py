@@ -16,8 +16,7 @@ import numpy as np
 from mstmm.array_validation import Array
 from mstmm.errors import SceneError
 
-from ...flexible.kernel_inputs import moment_inputs
-from ...flexible.modal_kernels import kernel
+from ...flexible.modal_body import kernel, moment_inputs
 from ...kernels.numpy_kernels import evaluate
 from .motion import tilde
 

@@ -23,7 +23,7 @@ from .response import Response, rigidified_bodies, split_node
 
 if TYPE_CHECKING:
     from ...engine.compiled_scene import CompiledScene
-    from ...flexible.modal_port import ModalPort
+    from ...flexible.modal_parts import ModalPort
     from ..observations import Observations
 
 

@@ -21,8 +21,7 @@ from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure
 from mstmm.risk import RUN, Risk
 
-from ...flexible.kernel_inputs import moment_inputs
-from ...flexible.modal_kernels import kernel
+from ...flexible.modal_body import kernel, moment_inputs
 from ...kernels.numpy_kernels import evaluate
 from ...run.run_execution import RunMonitor, first_run
 from ..observations import Observations

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mstmm.runtime.flexible.modal_body import ModalBody
-from mstmm.runtime.flexible.modal_port import ModalPort
+from mstmm.runtime.flexible.modal_parts import ModalPort
 
 Array = NDArray[np.float64]
 

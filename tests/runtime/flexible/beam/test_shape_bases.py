@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from mstmm.errors import SceneError
+from mstmm.runtime.flexible.beam.beam_data import Frame
 from mstmm.runtime.flexible.beam.frame_conditions import modes_in_frame
-from mstmm.runtime.flexible.beam.frame_location import Frame
 from mstmm.runtime.flexible.beam.shape_functions import Piecewise
 from mstmm.runtime.flexible.modal_body import ModalBody
 from tests.support.flexible.vibrations import frequencies, ground_hinge_equations, hinge_equations

@@ -11,10 +11,10 @@ import pytest
 from numpy.typing import NDArray
 from scipy import sparse
 
-from mstmm.runtime.flexible.elastic.field_moments import field_moments
 from mstmm.runtime.flexible.elastic.finite_element_model import ElasticModel
 from mstmm.runtime.flexible.elastic.matrices import from_arrays
 from mstmm.runtime.flexible.elastic.modal_elastic import elastic_bodies, save_matrices
+from mstmm.runtime.flexible.elastic.shape_moments import field_moments
 from mstmm.runtime.flexible.modal_body import ModalBody
 from tests.support.scenes import elastic_bar as bar
 

@@ -138,7 +138,7 @@ def test_a_factorisation_too_long_is_refused_unbegun(monkeypatch: pytest.MonkeyP
     """A cube of as many cells as a plate needs far more."""
     for name in ("scipy.sparse.linalg.splu", "scipy.sparse.linalg.eigsh"):
         monkeypatch.delattr(name)
-    monkeypatch.setattr("mstmm.runtime.flexible.elastic.matrix_checks.MAX_WORK", 1e8)
+    monkeypatch.setattr("mstmm.runtime.flexible.elastic.matrices.MAX_WORK", 1e8)
     cube = bar.table()["box"] | {"divisions": [4, 4, 4]}
     with pytest.raises(SceneError, match=r"2187 unknowns .* 1e\+08 multiplications .*, found 4"):
         bar.body(bar.table(box=cube))

@@ -9,7 +9,7 @@ import pytest
 
 import mstmm
 from mstmm.runtime.flexible.elastic.modal_elastic import elastic_bodies
-from mstmm.runtime.flexible.modal_scales import radius_of_gyration
+from mstmm.runtime.flexible.modal_body import radius_of_gyration
 
 LENGTH, SIDE, YOUNG = 1.0, 0.02, 2e11
 BENDING, STRETCHING = YOUNG * SIDE**4 / 12, YOUNG * SIDE**2

@@ -12,7 +12,7 @@ import pytest
 from scipy.optimize import brentq
 
 import mstmm
-from mstmm.runtime.flexible.beam.restraint import Edge, biconnected_components
+from mstmm.runtime.flexible.beam.planar_motion import Edge, biconnected_components
 from mstmm.runtime.flexible.flexible_bodies import modal_bodies
 from tests.support.scenes.single_beam import FREE, HELD, PIN, body_of
 

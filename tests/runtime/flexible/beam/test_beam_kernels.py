@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 import mstmm
 from mstmm.runtime.flexible.beam import beam_kernels
-from mstmm.runtime.flexible.beam.multilinear import kernel_terms, known_factor
+from mstmm.runtime.flexible.beam.beam_kernels import kernel_terms, known_factor
 from mstmm.runtime.flexible.modal_body import ModalBody
 
 Array = NDArray[np.float64]
