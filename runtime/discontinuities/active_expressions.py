@@ -1,16 +1,32 @@
-"""Expressions of a scene that act on its motion, with their names for messages."""
+"""Expressions of a scene that act on its motion, also as functions of one variable."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
+from mstmm.array_validation import Array
 from mstmm.expression.derivatives import Inputs
 from mstmm.expression.expression import Expression
+from mstmm.expression.parser import Term
 from mstmm.scene import Scene
 from mstmm.scene.tables.chain import Hinges
 from mstmm.scene.tables.hinge import Hinge, HingeTable
 from mstmm.scene.tables.loads import Spring
+
+from .cell_subdivision import Margin, WatchedFunction
+from .interval_enclosures import (
+    EVERYTHING,
+    TIME,
+    Enclosure,
+    Interval,
+    cos,
+    enclose,
+    identity_enclosure,
+    terms_of_names,
+)
 
 
 @dataclass(frozen=True)
@@ -120,3 +136,131 @@ def examined_hinges(one: ActiveExpression, hinges: Hinges) -> Iterator[Hinge | N
         yield hinges[index]
     if not one.hinges:
         yield None
+
+
+#: Maximum number of cells of an expression, and of evaluated terms in all cells together.
+_MAX_CELLS, _MAX_TERM_EVALUATIONS = 2**16, 2**18
+
+_DIFFERENCES = frozenset({"lt", "le", "gt", "ge", "min", "max"})
+_FUNCTIONS = frozenset({
+    "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "exp", "log",
+    "sqrt", "pow", "div",
+})  # fmt: skip
+
+
+#: Function from cells of one variable to enclosures of the names in an expression.
+Leaves = Callable[[Interval], Mapping[str, Enclosure]]
+
+
+class ExpressionFunctions:
+    """Expression as functions over cells of time, or of another variable.
+
+    The variable is the first of `names`; `leaves` gives the enclosures of all `names` over its
+    cells.  The second derivative of a `drive` acts on the motion.
+    """
+
+    def __init__(
+        self,
+        expression: Expression,
+        constants: Mapping[str, float],
+        drive: bool = False,
+        names: Sequence[str] = (TIME,),
+        leaves: Leaves | None = None,
+    ) -> None:
+        self.expression, self.constants = expression, constants
+        self.drive, self.variable = drive, names[0]
+        self._leaves = leaves or (lambda t: {names[0]: identity_enclosure(t)})
+        self.order, varying_terms = terms_of_names(expression, constants, names)
+        self.varying = frozenset(varying_terms)
+        self.max_cells = min(_MAX_CELLS, _MAX_TERM_EVALUATIONS // max(1, len(self.order)))
+
+    def terms(self, t: Interval) -> dict[int, Enclosure]:
+        """Enclosures of all terms that depend on the variable only."""
+        return enclose(self.expression.terms, self.order, self.constants, self._leaves(t))
+
+    def values(self, number: int, at: Array) -> Array:
+        """Values (n,) of a term at values (n,) of the variable; nan where it is undefined."""
+        bounds = self.terms(Interval(at, at))[number].value
+        with np.errstate(invalid="ignore"):
+            return np.broadcast_to((bounds.lo + bounds.hi) / 2, at.shape)
+
+    def widest(self) -> list[int]:
+        """Largest terms that depend on the variable only."""
+        terms = self.expression.terms
+        inner_terms = {i for n in self.varying for i in terms[n].args}
+        return sorted(self.varying - inner_terms)
+
+    def narrow_candidates(self) -> list[WatchedFunction]:
+        """Functions that may have narrow features: all but sums, products and switches.
+
+        For a drive, whose second derivative acts, their slopes are included.
+        """
+        functions = []
+        for term_index in sorted(self.varying):
+            term = self.expression.terms[term_index]
+            if term.op == "div" and term.args[1] not in self.varying:
+                continue
+            if term.op in _FUNCTIONS:
+                is_periodic = term.op in ("sin", "cos")
+                argument = term.args[0] if is_periodic else None
+                functions.append(WatchedFunction(term_index, argument))
+                if self.drive:
+                    functions.append(WatchedFunction(term_index, argument, slope=True))
+        return functions
+
+    def margins(self) -> list[Margin]:
+        """Functions that change sign where the expression switches, except linear functions.
+
+        The switching times of linear functions are known exactly (`linear_switches`).
+        """
+        linear_terms, terms = self.expression.linear_switches(), self.expression.terms
+        unique_margins: dict[tuple[bool, str], Margin] = {}
+        for term_index in sorted(self.varying - set(linear_terms)):
+            term = terms[term_index]
+            margin = self._margin(term)
+            if margin is not None:
+                texts = [self.expression.text[terms[i].start : terms[i].end] for i in term.args]
+                key = " - ".join(
+                    texts if term.op in _DIFFERENCES else texts[term.op == "div" :][:1]
+                )
+                unique_margins.setdefault((term.op == "tan", key), margin)
+        return list(unique_margins.values())
+
+    def _margin(self, term: Term) -> Margin | None:
+        op, args = term.op, term.args
+        if op in _DIFFERENCES:
+            return self._margin_of(args, lambda a, b: a - b)
+        if op in ("sign", "abs", "log", "sqrt", "atan2"):
+            return self._margin_of(args[:1], lambda a: a)
+        if op == "div" and args[1] in self.varying:
+            return self._margin_of(args[1:], lambda a: a)
+        if op == "tan":
+            return self._margin_of(args, lambda a: Enclosure(cos(a.value), EVERYTHING))
+        if op == "pow" and args[0] in self.varying and not self._is_natural_number(args[1]):
+            return self._margin_of(args[:1], lambda a: a)
+        return None
+
+    def _is_natural_number(self, exponent: int) -> bool:
+        value = self.expression.terms[exponent].constant
+        return value is not None and value >= 0 and value == int(value)
+
+    def _margin_of(self, args: tuple[int, ...], difference: Callable[..., Enclosure]) -> Margin:
+        term_indices = self._subterm_indices(args)
+        terms, constants = self.expression.terms, self.constants
+
+        def margin(t: Interval) -> Enclosure:
+            enclosures = enclose(terms, term_indices, constants, self._leaves(t))
+            with np.errstate(all="ignore"):
+                return difference(*(enclosures[i] for i in args))
+
+        return margin
+
+    def _subterm_indices(self, args: tuple[int, ...]) -> list[int]:
+        """Indices of `args` and of all terms on which they depend."""
+        visited, waiting = set[int](), list(args)
+        while waiting:
+            term_index = waiting.pop()
+            if term_index not in visited:
+                visited.add(term_index)
+                waiting += self.expression.terms[term_index].args
+        return sorted(visited)

@@ -3,6 +3,10 @@
 A method evaluates a load only at its stages.  All that can be computed of loads in advance is
 therefore determined for the whole run: every time at which an expression switches (a comparison,
 `sign`, `abs`, `min`, `max`, a pole), and every feature so narrow that a step could miss it.
+
+Between the two times that enclose a pole a run makes one step without an error estimate.  That is
+right where a force jumps, or grows as slowly as 1/sqrt(t), whose integral is finite.  A force that
+grows like 1/t or faster causes an unbounded motion.
 """
 
 from __future__ import annotations
@@ -12,6 +16,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mstmm.array_validation import Array
 from mstmm.errors import SceneError
@@ -19,11 +24,8 @@ from mstmm.expression.derivatives import Inputs, jump_message
 from mstmm.numerics.piecewise_polynomial import discontinuities
 from mstmm.risk import Risk
 
-from .active_expressions import ActiveExpression
-from .expression_functions import ExpressionFunctions
-from .poles import find_poles
-from .step_limits import StepLimits, step_limits
-from .switching_times import find_roots
+from .active_expressions import ActiveExpression, ExpressionFunctions
+from .cell_subdivision import StepLimits, find_roots, step_limits
 
 #: Fraction of the run within which two times are equal at its ends.
 _TIME_ROUNDING = 1e-15
@@ -110,66 +112,47 @@ def _multiples(step: float, start: float, end: float) -> Array:
 def _map_expressions(
     expressions: list[ActiveExpression], start: float, end: float, inputs: Inputs
 ) -> TimeMap:
-    breaks, limits, findings = set[float](), list[tuple[StepLimits, str]](), list[Risk]()
+    breaks, limits, risks = set[float](), list[tuple[StepLimits, str]](), list[Risk]()
     poles_of_run = list[tuple[float, str]]()
     for entry in expressions:
         functions = ExpressionFunctions(entry.expression, dict(entry.constants), entry.drive)
         breaks.update(entry.expression.time_breaks())
         breaks.update(knot for name in entry.inputs for knot in inputs[name].knots)
         if entry.drive:
-            knots = sorted(
-                {knot for name in entry.inputs for knot in discontinuities(inputs[name])}
-            )
-            jump_text = jump_message(
-                entry.expression, _neighbours_of_knots(knots, start, end), inputs
-            )
-            if jump_text:
-                raise SceneError(f"{entry.description}: {_quote_expression(entry)} {jump_text}")
-        is_force = not (entry.drive or entry.condition)
+            knots = {knot for name in entry.inputs for knot in discontinuities(inputs[name])}
+            _reject_jumps(entry, _neighbours_of_knots(sorted(knots), start, end), inputs)
         for margin in functions.margins():
-            roots_found = find_roots(margin, start, end, functions.max_cells)
-            breaks.update(roots_found.gaps.ravel().tolist())
-            jump_text = (
-                jump_message(entry.expression, roots_found.gaps.tolist(), inputs)
-                if entry.drive
-                else ""
-            )
-            if jump_text:
-                raise SceneError(f"{entry.description}: {_quote_expression(entry)} {jump_text}")
-            is_pole, is_whole = (
-                find_poles(functions, roots_found.gaps)
-                if is_force
-                else (roots_found.gaps[:0, 0] > 0, False)
-            )
-            if is_pole.any():
-                pole_time = float(roots_found.gaps[np.argmax(is_pole), 0])
-                if is_whole:
-                    poles_of_run.append((max(pole_time, start), _pole_message(entry)))
-                else:
-                    findings.append(_pole_risk(entry, pole_time))
-            if not roots_found.complete:
-                findings.append(_switches_risk(entry, roots_found.open_from))
-        watched_functions = functions.narrow_candidates()
-        if watched_functions:
-            limits.append(
-                (
-                    step_limits(
-                        functions.terms, watched_functions, start, end, functions.max_cells
-                    ),
-                    entry.description,
-                )
-            )
-            if not limits[-1][0].complete:
-                findings.append(_narrow_load_risk(entry, float(limits[-1][0].longest.min())))
+            roots = find_roots(margin, start, end, functions.max_cells)
+            breaks.update(roots.gaps.ravel().tolist())
+            if entry.drive:
+                _reject_jumps(entry, roots.gaps.tolist(), inputs)
+            elif not entry.condition:
+                is_pole, is_whole = find_poles(functions, roots.gaps)
+                t = float(roots.gaps[np.argmax(is_pole), 0]) if is_pole.any() else None
+                if t is not None and is_whole:
+                    poles_of_run.append((max(t, start), _pole_message(entry)))
+                elif t is not None:
+                    risks.append(_pole_risk(entry, t))
+            if not roots.complete:
+                risks.append(_switches_risk(entry, roots.open_from))
+        watched = functions.narrow_candidates()
+        if watched:
+            limit = step_limits(functions.terms, watched, start, end, functions.max_cells)
+            limits.append((limit, entry.description))
+            if not limit.complete:
+                risks.append(_narrow_load_risk(entry, float(limit.longest.min())))
     starts, longest, narrowest = _combine_limits(limits)
     return TimeMap(
-        _times_within_run(breaks, start, end),
-        starts,
-        longest,
-        narrowest,
-        min(poles_of_run, default=None),
-        tuple(dict.fromkeys(findings)),
-    )
+        _times_within_run(breaks, start, end), starts, longest, narrowest,
+        min(poles_of_run, default=None), tuple(dict.fromkeys(risks)),
+    )  # fmt: skip
+
+
+def _reject_jumps(entry: ActiveExpression, gaps: list[tuple[float, float]], inputs: Inputs) -> None:
+    """Raise SceneError if a drive jumps within one of the gaps (s, s)."""
+    text = jump_message(entry.expression, gaps, inputs)
+    if text:
+        raise SceneError(f"{entry.description}: {_quote_expression(entry)} {text}")
 
 
 def _pole_message(one: ActiveExpression) -> str:
@@ -181,13 +164,12 @@ def _pole_message(one: ActiveExpression) -> str:
 
 def _pole_risk(one: ActiveExpression, t: float) -> Risk:
     return Risk(
-        "pole",
-        one.description,
+        "pole", one.description,
         f"a part of {one.description} ({_quote_expression(one)}) is unbounded at t = {t:.6g} s: "
         "the run stops there unless a factor of this part vanishes",
         "end the run before that time, or limit the part, for example by min or max",
         seen_before_run=True,
-    )
+    )  # fmt: skip
 
 
 def _neighbours_of_knots(knots: list[float], start: float, end: float) -> list[tuple[float, float]]:
@@ -206,24 +188,20 @@ def _times_within_run(times: set[float], start: float, end: float) -> Array:
 
 def _switches_risk(one: ActiveExpression, since: float) -> Risk:
     return Risk(
-        "switches",
-        one.description,
+        "switches", one.description,
         f"{one.description} ({_quote_expression(one)}) switches too often for steps to end at "
         f"every switch: some are missed from t = {since:.6g} s on",
-        "give max_step, or a shorter run",
-        seen_before_run=True,
-    )
+        "give max_step, or a shorter run", seen_before_run=True,
+    )  # fmt: skip
 
 
 def _narrow_load_risk(one: ActiveExpression, longest: float) -> Risk:
     return Risk(
-        "narrow-load",
-        one.description,
+        "narrow-load", one.description,
         f"{one.description} ({_quote_expression(one)}) changes too often to be examined completely "
         f"before the run; steps are limited to {longest:.2g} s where it was not examined",
-        "give max_step",
-        seen_before_run=True,
-    )
+        "give max_step", seen_before_run=True,
+    )  # fmt: skip
 
 
 def _quote_expression(one: ActiveExpression) -> str:
@@ -245,4 +223,45 @@ def _combine_limits(paces: list[tuple[StepLimits, str]]) -> tuple[Array, Array, 
     return starts, np.minimum.reduce(limits_by_start), narrowest
 
 
-__all__ = ["TimeMap", "time_map"]
+#: Operations that have poles.
+_POLE_OPERATIONS = frozenset({"div", "pow", "tan"})
+
+#: Distances from a pole at which the function is compared, in widths of its gap; the width is at
+#: least so many spacings of floating-point numbers.
+_DISTANCES, _MIN_WIDTH_SPACINGS = (1.0, 100.0, 10_000.0), 64.0
+
+#: A function that grows by this factor from distance to distance grows like 1/t^0.9 or faster.
+_MIN_POLE_GROWTH = 50**0.9
+
+
+def find_poles(view: ExpressionFunctions, gaps: Array) -> tuple[NDArray[np.bool_], bool]:
+    """Find the gaps (n, 2), s, that contain a pole of the expression or of a part of it.
+
+    Returns a mask (n,), and whether the whole expression has the poles.  Only parts that depend on
+    time alone are examined.
+    """
+    is_pole = np.zeros(len(gaps), bool)
+    has_pole_operation = any(view.expression.terms[i].op in _POLE_OPERATIONS for i in view.varying)
+    if not has_pole_operation or not len(gaps):
+        return is_pole, False
+    largest_terms = view.widest()
+    for term_index in largest_terms:
+        is_pole |= _has_pole(view, term_index, gaps)
+    return is_pole, largest_terms == [view.expression.root]
+
+
+def _has_pole(view: ExpressionFunctions, number: int, gaps: Array) -> NDArray[np.bool_]:
+    is_pole = np.zeros(len(gaps), bool)
+    width = np.diff(gaps, axis=1)[:, 0]
+    width = np.maximum(width, _MIN_WIDTH_SPACINGS * np.spacing(np.abs(gaps).max(axis=1)))
+    for edge, direction in ((gaps[:, 0], -1.0), (gaps[:, 1], 1.0)):
+        near_value, middle_value, far_value = (
+            np.abs(view.values(number, edge + direction * distance * width))
+            for distance in _DISTANCES
+        )
+        is_pole |= (
+            (near_value > _MIN_POLE_GROWTH * middle_value)
+            & (middle_value > _MIN_POLE_GROWTH * far_value)
+            & (far_value > 0)
+        )
+    return is_pole

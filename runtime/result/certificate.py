@@ -167,19 +167,18 @@ class Certificate(NotebookDisplay):
         not_determined = "not determined: the run has only one sample; give more output times"
         rows = [("verdict", str(self.verdict()))] if verdict else []
         rows.append(("run", self.message))
-        rows.append(
-            ("energy balance", not_determined if self.sample_count < 2 else str(self.energy))
-        )
         if self.sample_count > 1:
+            rows.append(("energy balance", str(self.energy)))
             rows += [(d.name, str(d)) for d in self.momentum]
+        else:
+            rows.append(("energy balance", not_determined))
         if self.quaternion_drift:
             rows.append(("quaternion length", f"within {self.quaternion_drift:.1e} of 1"))
         if self.loop_closure is not None:
             rows.append(("closed loops", str(self.loop_closure)))
         if self.pivot_loss is not None:
-            rows.append(
-                ("pivot ratio", f'{self.pivot_loss.ratio:.1e} at hinge "{self.pivot_loss.hinge}"')
-            )
+            pivot = self.pivot_loss
+            rows.append(("pivot ratio", f'{pivot.ratio:.1e} at hinge "{pivot.hinge}"'))
         elif self.pivots_not_checked:
             rows.append(("pivot ratio", f"not computed for more than {MAX_CHECKED_BODIES} bodies"))
         if self.singularity_distance is not None:
@@ -216,55 +215,37 @@ def _verdict(c: Certificate, accuracy: float, balance: float | None) -> Verdict:
             "the run has only one sample, so that energy and momentum cannot be compared"
         )
     if c.error is not None:
-        objections += _uncovered_objections(c.error) + _accuracy_objections(c, accuracy)
+        if c.error.covered is not None:
+            objections.append(
+                f"the error is unknown after t = {c.error.covered:.4g} s, where the second run "
+                "stopped; use a shorter run or other tolerances"
+            )
+        objections += _accuracy_objections(c.error, accuracy)
     elif c.achieved_error is None:
         missing.append("the error was not estimated (use certify=True)")
     objections += c.objections
     bounds = f"errors within {accuracy:g} rad or {accuracy:.3g} of the motion"
     if c.achieved_error is not None:
         bounds = f"error of {c.achieved_error.quantity} as requested"
-    return Verdict(
-        tuple(dict.fromkeys(objections)),
-        tuple(missing),
-        f"{bounds}, balances within {balance_bound:g}",
-    )
+    bounds = f"{bounds}, balances within {balance_bound:g}"
+    return Verdict(tuple(dict.fromkeys(objections)), tuple(missing), bounds)
 
 
-def _uncovered_objections(error: ErrorEstimate) -> list[str]:
-    """Objection that a failed second run leaves the error unknown after its end."""
-    if error.covered is None:
-        return []
-    return [
-        f"the error is unknown after t = {error.covered:.4g} s, where the second run stopped; use "
-        "a shorter run or other tolerances"
-    ]
-
-
-def _accuracy_objections(c: Certificate, accuracy: float) -> list[str]:
+def _accuracy_objections(error: ErrorEstimate, accuracy: float) -> list[str]:
     """Objections to units of q whose estimated error over the run exceeds `accuracy`."""
-    assert c.error is not None
+    horizon = ""
+    if error.divergence_time is not None:
+        horizon = f" (predictable until {error.divergence_time:.4g} s)"
+        horizon = " (not predictable from the start)" if error.diverges_at_start else horizon
     objections = []
-    for unit, values in c.error.q.items():
-        worst = float(values.max(initial=0.0))
-        if worst > error_limit(c.error.excursion, unit, accuracy, accuracy):
-            motion = (
-                ""
-                if unit == "rad"
-                else f", with a motion of {c.error.excursion.get(unit, 0.0):.2g} {unit}"
-            )
+    for unit, worst in error.difference("q").items():
+        if worst > error_limit(error.excursion, unit, accuracy, accuracy):
+            motion = f", with a motion of {error.excursion.get(unit, 0.0):.2g} {unit}"
+            motion = "" if unit == "rad" else motion
             objections.append(
-                f"the estimated error of q is {worst:.1e} {unit or '1'}{motion}"
-                f"{_horizon_note(c.error)}"
+                f"the estimated error of q is {worst:.1e} {unit or '1'}{motion}{horizon}"
             )
     return objections
-
-
-def _horizon_note(error: ErrorEstimate) -> str:
-    if error.divergence_time is None:
-        return ""
-    if error.diverges_at_start:
-        return " (not predictable from the start)"
-    return f" (predictable until {error.divergence_time:.4g} s)"
 
 
 # --- rows -----------------------------------------------------------------------------------------
@@ -293,18 +274,13 @@ def _error_rows(c: Certificate) -> list[tuple[str, str]]:
             rows.append((f"error of {kind}, at most", f"{values}{until}{whole_run}{source}"))
     rows.append(("scope of the error", c.error_scope))
     if error.divergence_time is not None:
-        horizon_text = (
-            f"t = {error.divergence_time:.6g} s: afterwards"
-            if is_limited
-            else "the start: from the first sample on"
+        horizon = "the start: from the first sample on"
+        horizon = f"t = {error.divergence_time:.6g} s: afterwards" if is_limited else horizon
+        text = (
+            f"{horizon} the two runs differ by more than {ANGLE:g} rad or {PART:.0%} of the "
+            "motion, and error estimates are not valid"
         )
-        rows.append(
-            (
-                "predictable until",
-                f"{horizon_text} the two runs differ by more than {ANGLE:g} rad or {PART:.0%} of "
-                "the motion, and error estimates are not valid",
-            )
-        )
+        rows.append(("predictable until", text))
     if error.tenfold_time is not None:
         rows.append(("growth of errors", f"tenfold every {error.tenfold_time:.3g} s"))
     return rows

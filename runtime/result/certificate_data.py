@@ -90,6 +90,10 @@ class Drift:
 class StepControl:
     """Fixed steps of a method of an order, tolerances, or a target error.
 
+    Control of local errors lets energy drift by up to nine times the tolerance, and errors of
+    motions are four to sixty times the drift, relative to what moves; both counted on the runs of
+    benchmarks/risk_checks.
+
     Attributes:
         step: s; None for adaptive steps.
         rtol, atol: its tolerances.

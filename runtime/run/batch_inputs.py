@@ -13,8 +13,7 @@ from mstmm.array_validation import Array, finite_array, mapping_by_name
 from mstmm.errors import SceneError
 from mstmm.numerics.piecewise_polynomial import PiecewisePolynomial, constant, interpolate
 
-from ..discontinuities.active_expressions import active_expressions
-from ..discontinuities.expression_functions import ExpressionFunctions
+from ..discontinuities.active_expressions import ExpressionFunctions, active_expressions
 from ..engine.inputs import InputValue, with_input_pieces
 
 if TYPE_CHECKING:
@@ -32,20 +31,12 @@ class BatchInputs:
 
     def model(self, model: CompiledScene, k: int) -> CompiledScene:
         """Model with the inputs of trajectory k."""
-        return (
-            model.with_packed_scene(with_input_pieces(model.packed_scene, self.rows[k]))
-            if self.rows[k]
-            else model
-        )
+        return _with_pieces(model, self.rows[k])
 
     def with_times(self, model: CompiledScene) -> CompiledScene:
         """Model with the time-dependent inputs, whose breaks end steps in all trajectories."""
         varying = {name: signal for name, signal in self.rows[0].items() if signal.varies}
-        return (
-            model.with_packed_scene(with_input_pieces(model.packed_scene, varying))
-            if varying
-            else model
-        )
+        return _with_pieces(model, varying)
 
     def moves_breaks(self, model: CompiledScene) -> bool:
         """True if constant inputs determine when an expression of time switches or is narrow."""
@@ -57,6 +48,12 @@ class BatchInputs:
                 if _feature_count(active, constants) != _feature_count(active, other_constants):
                     return True
         return False
+
+
+def _with_pieces(model: CompiledScene, pieces: dict[str, PiecewisePolynomial]) -> CompiledScene:
+    if not pieces:
+        return model
+    return model.with_packed_scene(with_input_pieces(model.packed_scene, pieces))
 
 
 def _feature_count(active: Any, constants: dict[str, float]) -> int:

@@ -37,8 +37,8 @@ from .run_messages import (
     curve_end_message,
     expression_cause,
     fastest_speed,
-    missed_switch_note,
     rest_note,
+    switch_notes,
 )
 from .trajectory import Trajectory
 
@@ -157,13 +157,7 @@ class _Loop:
             scene, self.samples(), settings, status, message, self.statistics(),
             (self.t, self.last),
         )  # fmt: skip
-        chatter = self.crossings.chatter
-        risks = [] if chatter is None else [chattering_note(scene, chatter)]
-        risks += (
-            []
-            if self.missed_crossing is None
-            else [missed_switch_note(scene, *self.missed_crossing)]
-        )
+        risks = switch_notes(scene, self.crossings.chatter, self.missed_crossing)
         return replace(result, risks=tuple(risks))
 
     def run_piece(self, y: Array, stop: float) -> Array:

@@ -20,13 +20,7 @@ from ..integrate.steppers.alpha_family import NewmarkFamily
 from ..packing.scene_packing import reject_loop_method, reject_speed_constraints
 from ..platform_support.interrupts import record_interrupts
 from .method_switching import MethodChoice
-from .run_messages import (
-    chattering_note,
-    missed_switch_note,
-    rest_note,
-    step_too_long_note,
-    stop_message,
-)
+from .run_messages import rest_note, step_too_long_note, stop_message, switch_notes
 from .scene_system import SceneSystem
 from .trajectory import Trajectory
 
@@ -168,20 +162,16 @@ def trajectory(
         system, samples, settings, status, message, run.statistics, (run.t, run.y),
         None if failure is None else failure.time,
     )  # fmt: skip
-    chattering = () if run.chatter is None else (chattering_note(system, run.chatter),)
-    missed = (
-        () if run.missed_condition is None else (missed_switch_note(system, *run.missed_condition),)
-    )
-    risks = (*chattering, *missed, *step_too_long_note(result))
+    risks = (
+        *switch_notes(system, run.chatter, run.missed_condition), *step_too_long_note(result)
+    )  # fmt: skip
     return replace(result, risks=risks) if risks else result
 
 
 def status_message(system: SceneSystem, run: Integrator, status: Status | None) -> str:
     """Sentence on the status of a run; status None means interrupted."""
-    return _interrupt_message(run) if status is None else stop_message(system, run)
-
-
-def _interrupt_message(run: Integrator) -> str:
+    if status is not None:
+        return stop_message(system, run)
     if run.kept_bytes <= MAX_SAMPLE_BYTES:
         return f"interrupted at t = {run.t:.9g} s"
     return (

@@ -109,18 +109,14 @@ class RunMonitor:
                 texts = {"engine": self.engine, "message": message, "methods": methods}
                 entries = {name: np.array(text) for name, text in texts.items()}
                 entries["seconds"] = np.array(self.earlier_seconds + time.monotonic() - self._begun)
-                self.checkpoint.save(
-                    {**run.state(), **entries}, _join_samples(earlier, run.samples)
-                )
+                samples = run.samples
+                samples = samples if earlier is None else Samples.join([earlier, samples])
+                self.checkpoint.save({**run.state(), **entries}, samples)
             except (MstmmError, MemoryError) as error:
                 note = f"no checkpoint written: {error or 'not enough memory'}"
                 if note not in self.notes:
                     self.notes.append(note)
         self._saved = time.monotonic()
-
-
-def _join_samples(earlier: Samples | None, samples: Samples) -> Samples:
-    return samples if earlier is None else Samples.join([earlier, samples])
 
 
 def first_run(
@@ -140,12 +136,14 @@ def first_run(
     if settings.method in classical_run.METHODS or settings.method in external_integrators.METHODS:
         if watch.checkpoint is not None:
             raise SceneError(f'method "{settings.method}" writes no checkpoints; use dop853')
-        package = (
-            classical_run if settings.method in classical_run.METHODS else external_integrators
-        )
+        is_classical = settings.method in classical_run.METHODS
+        package = classical_run if is_classical else external_integrators
         return package.integrate(model, settings, q, u, watch.report_progress)
     classical_run.reject_classical_options(settings)
-    state, earlier = _load_checkpoint(watch.checkpoint) if resume else (None, None)
+    state: State | None = None
+    earlier: Samples | None = None
+    if resume and watch.checkpoint is not None and watch.checkpoint.exists():
+        state, earlier = watch.checkpoint.load()
     recorded = None if state is None else str(state["engine"])
     engine, code = model.looped, code_at_start(model, settings, recorded)
     cache = take_start_cache(model, settings) if beginnings is None else beginnings
@@ -226,13 +224,6 @@ def _restore_run(
     if not run.accepts(earlier):
         raise checkpoint.damage_error("samples of another size")
     return str(state["message"]) if ended else ""
-
-
-def _load_checkpoint(checkpoint: Checkpoint | None) -> tuple[State | None, Samples | None]:
-    """State and samples of an interrupted run; (None, None) without a checkpoint file."""
-    if checkpoint is None or not checkpoint.exists():
-        return None, None
-    return checkpoint.load()
 
 
 def second_run(
@@ -346,22 +337,21 @@ class StartCache:
         u: Array,
     ) -> tuple[SceneSystem, Integrator]:
         """System and integrator at the start of a run from (nq,), (nu,)."""
-        if self._cached is None or not self._is_reusable(self._cached[0], compiled, settings):
+        position_level = uses_position_constraints(settings)
+        system, run = self._cached or (None, None)
+        if (
+            system is None or run is None or not system.uses_code(compiled)
+            or system.uses_position_level != position_level
+        ):  # fmt: skip
             system = SceneSystem(engine, compiled)
             run = make_run(system, settings, q, u, energy=self._energy_at)
             self._cached = system, run
             return system, run
-        system, run = self._cached
         tableau = initial_method(system, settings)
         system.memory[:] = engine.start_memory()
         start = system.begin(settings.t_start, q, u)
         run.start(tableau, settings, start, tolerances(system, settings, start, self._energy_at))
         return system, run
-
-    @staticmethod
-    def _is_reusable(system: SceneSystem, compiled: SceneCode | None, settings: Settings) -> bool:
-        same_level = system.uses_position_level == uses_position_constraints(settings)
-        return system.uses_code(compiled) and same_level
 
     def _energy_at(self, system: SceneSystem, t: float, start: Array) -> float:
         """Energy of the start in J, computed once for runs from the same start."""

@@ -247,6 +247,16 @@ def step_too_long_note(run: Trajectory) -> tuple[Risk, ...]:
     ),)  # fmt: skip
 
 
+def switch_notes(
+    system: SceneSystem, chatter: tuple[int, float] | None, missed: tuple[int, float] | None
+) -> list[Risk]:
+    """Risks of a switch that chatters, and of an event or switch that a step may have missed."""
+    return [
+        *([] if chatter is None else [chattering_note(system, chatter)]),
+        *([] if missed is None else [missed_switch_note(system, *missed)]),
+    ]
+
+
 def missed_switch_note(system: SceneSystem, index: int, since: float) -> Risk:
     """Risk that a step missed a fast event or, for an index past the events, a fast switch."""
     n = len(system.event_names)

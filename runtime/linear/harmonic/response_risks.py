@@ -15,7 +15,7 @@ from mstmm.errors import MstmmError, SceneError
 from mstmm.risk import Risk, information
 
 from ...packing.scene_parameters import scene_data, scene_from_data
-from ...result.flexible.unshaped_directions import unshaped_directions
+from ...result.flexible.missing_shapes import unshaped_directions
 from ..input_channels import Channel
 from ..operating_point.departure import MATRICES, find_changes, find_departure
 from ..operating_point.later_states import LaterStates

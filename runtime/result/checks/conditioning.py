@@ -106,16 +106,12 @@ def pivot_loss(model: CompiledScene, run: Trajectory) -> PivotLoss | None:
     None if nothing moves freely, for scenes of more than `MAX_CHECKED_BODIES` bodies, and for least
     squares, which form no such difference.
     """
-    if (
-        not len(run.t)
-        or not model.nu
-        or len(model.scene.bodies) > MAX_CHECKED_BODIES
-        or model.packed_scene.qr
-    ):
+    packed = model.packed_scene
+    if not len(run.t) or not model.nu or len(model.scene.bodies) > MAX_CHECKED_BODIES:
         return None
-    if model.packed_scene.system.has_loops:
+    if packed.qr or packed.system.has_loops:
         return None
-    refines = int(model.packed_scene.model.refines)
+    refines = int(packed.model.refines)
     worst, pivots = PivotLoss(0.0, "", 0.0, refines), _PivotRatios(model)
     count = int(np.clip(_MAX_BODY_SAMPLES // len(pivots.parents), 1, MAX_PIVOT_SAMPLES))
     for k in np.unique(np.linspace(0, len(run.t) - 1, count).astype(int)):

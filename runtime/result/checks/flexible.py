@@ -18,7 +18,7 @@ import numpy as np
 from mstmm.array_validation import Array
 from mstmm.risk import Risk
 
-from ...discontinuities.step_limits import MAX_STEP_ANGLE
+from ...discontinuities.cell_subdivision import MAX_STEP_ANGLE
 from ..flexible.body_motions import FlexibleBodies
 from ..flexible.modal_energy import modal_frequencies, modal_mass
 from ..flexible.model_range import ModelRange, model_ranges
@@ -33,15 +33,9 @@ if TYPE_CHECKING:
 #: Thresholds: slope, load ratio of a linear beam and spin in first frequencies, truncated bending
 #: energy, shear, rotation of a section (rad), buckling, strain.
 (
-    MAX_SLOPE,
-    MAX_LOAD_RATIO,
-    MAX_SPIN_RATIO,
-    MAX_MISSED_SHARE,
-    MAX_SHEAR_ERROR,
-    MAX_ROTATION,
-    MIN_BUCKLING_RATIO,
-    MAX_STRAIN,
-) = 0.3, 0.1, 1.0, 0.1, 0.05, 1.4, -0.9, 0.05
+    MAX_SLOPE, MAX_LOAD_RATIO, MAX_SPIN_RATIO, MAX_MISSED_SHARE, MAX_SHEAR_ERROR, MAX_ROTATION,
+    MIN_BUCKLING_RATIO, MAX_STRAIN,
+) = 0.3, 0.1, 1.0, 0.1, 0.05, 1.4, -0.9, 0.05  # fmt: skip
 
 #: Largest accepted ratio of the frequency of a load to that of the last shape.
 _MAX_FREQUENCY_RATIO = 1.5
@@ -89,16 +83,13 @@ class StiffeningCheck(_BodyCheck):
 
     def before(self, start: RunStart) -> Iterator[Risk]:
         """Risk of linear bodies whose stiffness changes too much by a spin that is known."""
-        linear = [
-            name
-            for name, body in start.model.flexible_bodies.items()
-            if not has_second_order_terms(body)
-        ]
+        flexible = start.model.flexible_bodies
+        linear = [name for name, body in flexible.items() if not has_second_order_terms(body)]
         if not linear:
             return
         bodies = FlexibleBodies(start.model, Observations(start.model, start.drive_path))
         for name in linear:
-            first = float(modal_frequencies(start.model.flexible_bodies[name])[0])
+            first = float(modal_frequencies(flexible[name])[0])
             spin = transverse_spin(bodies.motion(name))
             ratio = spin / first if first > 0 else 0.0
             if ratio**2 > MAX_LOAD_RATIO:

@@ -2,7 +2,7 @@
 
 A force that is narrow in a coordinate is evaluated at the stages of steps only: long steps pass
 over it, and every estimated error is zero. After a run its path is known, and so is the width of a
-function of a coordinate along it (`breaks.pace`, with the coordinate in place of time): a step
+function of a coordinate along it (`step_limits`, with the coordinate in place of time): a step
 longer than this width, across a peak of the function that neither of its ends shows, has missed it.
 Functions of speeds, several coordinates, or the length of a spring are examined along the run's
 time instead. If samples are output times, the steps are not known; if one may have passed over a
@@ -24,13 +24,17 @@ from mstmm.risk import Risk
 
 from ...discontinuities.active_expressions import (
     ActiveExpression,
+    ExpressionFunctions,
     active_expressions,
     examined_hinges,
 )
-from ...discontinuities.expression_functions import ExpressionFunctions
-from ...discontinuities.interval_arithmetic import Interval
-from ...discontinuities.interval_enclosures import TIME, Enclosure
-from ...discontinuities.step_limits import CELLS_PER_STEP, StepLimits, WatchedFunction, step_limits
+from ...discontinuities.cell_subdivision import (
+    CELLS_PER_STEP,
+    StepLimits,
+    WatchedFunction,
+    step_limits,
+)
+from ...discontinuities.interval_enclosures import TIME, Enclosure, Interval
 from ...run.run_execution import RunMonitor, first_run
 from ..sources.paths import RunStates, SampledVariable, make_enclosures, sampled_variables
 from .check import Check
@@ -107,15 +111,12 @@ def _risks_of_steps(model: CompiledScene, run: Trajectory) -> tuple[Risk, ...]:
     risks = dict[str, Risk]()
     candidates = chain(_coordinate_candidates(model, run), _time_candidates(model, run))
     for subject, view, path in islice(candidates, _MAX_EXPRESSIONS):
-        peak = _first_missed_peak(view, path, _has_step_samples(run))
+        # samples may be the ends of adaptive steps, which shorten at detected features
+        ends_are_steps = run.settings.output_times is None and run.settings.step is None
+        peak = _first_missed_peak(view, path, ends_are_steps)
         if peak is not None:
             risks.setdefault(subject, _risk(subject, view.variable, path, *peak))
     return tuple(risks.values())
-
-
-def _has_step_samples(run: Trajectory) -> bool:
-    """Whether samples are the ends of adaptive steps, which shorten at detected features."""
-    return run.settings.output_times is None and run.settings.step is None
 
 
 def _rerun_with_all_steps(model: CompiledScene, run: Trajectory) -> Trajectory | None:
@@ -170,11 +171,8 @@ def _coordinate_candidates(
             for name in load.expression.names:
                 path = _coordinate_path(model, run, fractions, name, hinge)
                 if path is not None:
-                    yield (
-                        load.description,
-                        ExpressionFunctions(load.expression, constants, names=(name.text,)),
-                        path,
-                    )
+                    view = ExpressionFunctions(load.expression, constants, names=(name.text,))
+                    yield load.description, view, path
 
 
 def _time_candidates(
@@ -203,15 +201,11 @@ def _time_candidates(
                                  x.rates[first : first + _STEPS_PER_PIECE + 1])
                     for name, x in motion.items()
                 }  # fmt: skip
-                step_lengths = np.minimum(np.diff(t), max_step)
+                path = _SampledPath(t, t[:-1], t[1:], np.minimum(np.diff(t), max_step), "s", ranges)
                 view = ExpressionFunctions(
                     load.expression, constants, False, order, make_enclosures(t, piece, names)
                 )
-                yield (
-                    load.description,
-                    view,
-                    _SampledPath(t, t[:-1], t[1:], step_lengths, "s", ranges),
-                )
+                yield load.description, view, path
 
 
 def _peaked_terms(view: ExpressionFunctions) -> list[WatchedFunction]:
@@ -391,24 +385,19 @@ def _first_missed_peak(
         positions, values, limits = _narrow_peaks(view, term, resolution, is_narrow, high)
         ends = view.values(term.term, path.positions)
         for position, value, limit in zip(positions, values, limits, strict=True):
-            is_long = (
-                path.step_distances
-                > (_TIME_STEP_FACTOR if path.ranges and ends_are_steps else 1.0) * limit
-            )
+            factor = _TIME_STEP_FACTOR if path.ranges and ends_are_steps else 1.0
+            is_long = path.step_distances > factor * limit
             missed = (path.minima <= position) & (position <= path.maxima) & is_long
             if ends_are_steps or path.ranges:
                 function_range = max(
                     np.ptp(np.append(values, ends)), path.ranges.get(term.term, 0.0)
                 )
-                missed &= (
-                    _hidden_height(value, ends, ends_are_steps) > _MIN_PEAK_RATIO * function_range
-                )
+                height = _hidden_height(value, ends, ends_are_steps)
+                missed &= height > _MIN_PEAK_RATIO * function_range
             if path.ranges and missed.any():  # a narrow part may not affect the whole
                 whole_values = view.values(root, np.append(path.positions, position))
-                missed &= (
-                    _hidden_height(whole_values[-1], whole_values[:-1], ends_are_steps)
-                    > _MIN_PEAK_RATIO * path.ranges[root]
-                )
+                height = _hidden_height(whole_values[-1], whole_values[:-1], ends_are_steps)
+                missed &= height > _MIN_PEAK_RATIO * path.ranges[root]
             if missed.any():
                 return position, float(path.step_distances[missed].max()), limit
     return None

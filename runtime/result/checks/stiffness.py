@@ -85,11 +85,8 @@ class StiffnessCheck(Check):
         settings, statistics = run.settings, run.statistics
         if not (_is_adaptive_explicit(settings) and statistics.stability_limited):
             return
-        if (
-            model.packed_scene.system.uses_memory
-            or len(run.t) <= _TRIALS
-            or not np.isfinite(run.q).all()
-        ):
+        is_restartable = not model.packed_scene.system.uses_memory and np.isfinite(run.q).all()
+        if not is_restartable or len(run.t) <= _TRIALS:
             return
         indices = np.unique(np.searchsorted(run.t, np.linspace(run.t[0], run.t[-1], _TRIALS + 1)))
         states = [(float(run.t[k]), run.q[k], run.u[k]) for k in indices]

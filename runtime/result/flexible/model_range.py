@@ -15,12 +15,16 @@ from mstmm.scene.checks.flexible_bodies import beam_lines
 from ...flexible.modal_body import radius_of_gyration
 from ...flexible.modal_parts import chunk_slices
 from . import range_estimators as e
-from .lateral_buckling import lateral_load_ratio, quadrature_rule
+from .missing_shapes import (
+    UnshapedDeformation,
+    lateral_load_ratio,
+    quadrature_rule,
+    unshaped_deformation,
+)
 from .modal_energy import modal_energy, modal_frequencies, strain_energy
 from .modal_participation import participation_by_body
 from .motion import elastic_moment, tilde
 from .section_loads import section_loads
-from .unshaped_directions import UnshapedDeformation, unshaped_deformation
 
 if TYPE_CHECKING:
     from .body_motions import FlexibleBodies
@@ -115,14 +119,9 @@ def model_ranges(flexible: FlexibleBodies) -> tuple[ModelRange, ...]:
     if not len(flexible.run.t) or not 0 < len(flexible.modal_bodies) <= MAX_BODIES:
         return ()
     shares = participation_by_body(flexible)
-    welded_lines = beam_lines(flexible.model.scene)
+    lengths = {name: line.length for name, line in beam_lines(flexible.model.scene).items()}
     return tuple(
-        _model_range(
-            flexible,
-            name,
-            shares.get(name),
-            welded_lines[name].length if name in welded_lines else None,
-        )
+        _model_range(flexible, name, shares.get(name), lengths.get(name))
         for name in flexible.modal_bodies
     )
 
@@ -142,15 +141,11 @@ def _model_range(
     )
     valid_samples = np.flatnonzero(finite)
     energies = strain_energy(full_motion.select_samples(valid_samples))
-    picked_indices = np.unique(
-        np.linspace(0, len(valid_samples) - 1, min(MAX_SAMPLES, len(valid_samples))).astype(int)
-    )
-    picked_indices = (
-        np.union1d(picked_indices, [int(np.argmax(energies))])
-        if len(valid_samples)
-        else picked_indices
-    )
-    motion, samples = full_motion.select_samples(valid_samples), valid_samples[picked_indices]
+    count = len(valid_samples)
+    picked = np.unique(np.linspace(0, count - 1, min(MAX_SAMPLES, count)).astype(int))
+    if count:
+        picked = np.union1d(picked, [int(np.argmax(energies))])
+    motion, samples = full_motion.select_samples(valid_samples), valid_samples[picked]
     slope, shapes = e.max_slope(finite_motion), body.shapes
     first_frequency = float(modal_frequencies(body)[0])
     has_section_loads = shapes is not None and name not in flexible.unbalanced
@@ -341,13 +336,9 @@ def _body_rows(body_range: ModelRange) -> list[tuple[str, str]]:
         change = "stiffened" if worst >= 0 else "softened"
         change = f"not {change}" if body_range.one_way else change
         motion_parts.append(f"{change} by loads {abs(worst):.2g} (gamma)")
-    shape_parts = [
-        f"{body_range.modes} in a {body_range.frame} frame"
-        if body_range.frame
-        else f"{body_range.modes}"
-    ]
-    if body_range.unmoved_frame:
-        shape_parts[0] += f" ({body_range.unmoved_frame} with fewer shapes)"
+    frame = f" in a {body_range.frame} frame" if body_range.frame else ""
+    frame += f" ({body_range.unmoved_frame} with fewer shapes)" if body_range.unmoved_frame else ""
+    shape_parts = [f"{body_range.modes}{frame}"]
     if body_range.last_share is not None and body_range.last_share[1]:
         shape_parts.append(
             f"{body_range.last_share[1]} holds {body_range.last_share[0]:.1e} of the energy"

@@ -258,12 +258,9 @@ def weighted_shear_error(motion: Motion, line: float | None = None) -> float | N
         return errors if errors is None else 0.0
     energies = modal_energy(motion)
     max_energy = float(energies.sum(axis=1).max())
-    shares = (
-        np.clip(energies.max(axis=0) / max_energy, 0.0, 1.0)
-        if max_energy > 0
-        else np.zeros(motion.body.n)
-    )
-    return float(np.max(shares * errors))
+    if not max_energy > 0:
+        return 0.0
+    return float(np.max(np.clip(energies.max(axis=0) / max_energy, 0.0, 1.0) * errors))
 
 
 #: E / (k G) of a rectangular section, nu = 0.3, k = 5/6.

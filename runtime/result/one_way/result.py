@@ -15,7 +15,7 @@ from ...engine.compiled_scene import CompiledScene
 from ...packing.packed_scene import releasable_hinges
 from ...packing.rigid_substitution import with_level
 from ...run.start_state import initial_state
-from ..checks.impacts import has_impacts
+from ..checks.conservation import has_impacts
 from ..flexible.body_motions import FlexibleBodies
 from ..flexible.modal_participation import participation_by_body
 from ..flexible.motion import Motion

@@ -12,8 +12,7 @@ from mstmm.array_validation import Array, Integers
 from mstmm.expression.expression import Name
 
 from ...discontinuities.active_expressions import ActiveExpression
-from ...discontinuities.interval_arithmetic import Interval
-from ...discontinuities.interval_enclosures import TIME, Enclosure
+from ...discontinuities.interval_enclosures import TIME, Enclosure, Interval
 from ...engine.looped_engine import Probe
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ import pytest
 
 from mstmm.expression.expression import Expression, parse
 from mstmm.runtime.discontinuities.active_expressions import ActiveExpression
-from mstmm.runtime.discontinuities.interval_arithmetic import Interval
 from mstmm.runtime.discontinuities.interval_enclosures import (
+    Interval,
     enclose,
     identity_enclosure,
     terms_of_time,

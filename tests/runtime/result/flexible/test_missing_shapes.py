@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 import mstmm
 from mstmm.runtime.packing.system_builder import expansion_of
-from mstmm.runtime.result.flexible.lateral_buckling import lateral_load_ratio, quadrature_rule
+from mstmm.runtime.result.flexible.missing_shapes import lateral_load_ratio, quadrature_rule
 from mstmm.runtime.result.flexible.model_range import model_ranges
 
 Array = NDArray[np.float64]
