@@ -72,11 +72,15 @@ def _actuator_speeds(model: CompiledScene, names: Sequence[str]) -> list[int]:
             hinge_speeds = range(slots.u, slots.u + slots.nu)
             speeds += [speed for speed in hinge_speeds if speed in model.free_speed_indices]
         else:
-            speeds.append(_effort_speed(model, name))
-    count, mobility = (
-        len(set(speeds)),
-        len(model.independent_speeds.indices) if model.independent_speeds else 0,
-    )
+            effort = channel(model, name)
+            if effort.speed < 0:
+                raise SceneError(
+                    f'actuators: "{name}": expected a hinge, or an effort of one such as '
+                    '"shoulder.effort"'
+                )
+            speeds.append(effort.speed)
+    freedom = model.independent_speeds
+    count, mobility = len(set(speeds)), len(freedom.indices) if freedom else 0
     if count != mobility:
         raise SceneError(
             f"actuators: expected as many speeds as the mobility of the mechanism, {mobility}, "
@@ -88,15 +92,6 @@ def _actuator_speeds(model: CompiledScene, names: Sequence[str]) -> list[int]:
 def _independent_names(model: CompiledScene) -> str:
     places = model.independent_speeds.indices if model.independent_speeds else ()
     return ", ".join(map(model.coordinate_layout.u_name, places))
-
-
-def _effort_speed(model: CompiledScene, name: str) -> int:
-    effort = channel(model, name)
-    if effort.speed < 0:
-        raise SceneError(
-            f'actuators: "{name}": expected a hinge, or an effort of one such as "shoulder.effort"'
-        )
-    return effort.speed
 
 
 def _efforts(

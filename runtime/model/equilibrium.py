@@ -88,7 +88,8 @@ def equilibrium(
             "another start, q = ..., or allow more steps, max_steps = ..."
         ) from None
     spins = _free_spins(model, rest, t, stability.neutral)
-    rest = remove_full_turns(model, start, _apply_drives(model, rest, t), t)
+    driven = SceneSystem(model.looped).start(t, rest, np.zeros(model.nu))[: model.nq]
+    rest = remove_full_turns(model, start, driven, t)
     result = rest.view(Equilibrium)
     result.residuals = search.residuals(rest)
     result.unstable_speeds = _moving_speeds(model, rest, stability.unstable)
@@ -193,11 +194,6 @@ def _body_points(model: CompiledScene, name: str, body: Any) -> Iterator[tuple[f
         yield packed.mass_center(name)
     for end in body.ends:
         yield packed.end(f"{name}.{end}")[2]
-
-
-def _apply_drives(model: CompiledScene, q: Array, t: float) -> Array:
-    """q with driven coordinates at the values of their drives."""
-    return SceneSystem(model.looped).start(t, q, np.zeros(model.nu))[: model.nq]
 
 
 def _list_largest_efforts(model: CompiledScene, failure: EquilibriumNotFoundError) -> str:

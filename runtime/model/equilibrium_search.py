@@ -66,11 +66,15 @@ class _SweepSearch:
     """Search by sweeps with rotors on all hinges, of a weight relative to the mass of the scene."""
 
     def __init__(self, model: CompiledScene, t: float, weight: float) -> None:
-        engine = _with_rotors(model, weight)
+        packed, mass = model.packed_scene, total_mass(model)
+        rotors = weight * (mass or 1.0) * (scene_length(model) / speed_scales(model)) ** 2
+        engine = LoopedEngine(packed_system(with_rotors(packed.system, rotors.tolist()), packed))
+        if model.loop_start is not None:
+            LoopCalls(engine, model.loop_start.start[0])  # determines its redundant rows
         self._scene = SceneSystem(engine, with_power=False)  # allocates the tapes
         self.stiffness = ShiftedStiffness(TangentMatrix(engine), t, speed_scales(model))
         gravity = float(np.linalg.norm(model.scene.gravity))
-        self._load = total_mass(model) * gravity * scene_length(model)
+        self._load = mass * gravity * scene_length(model)
 
     def find(
         self, q: Array, tolerance: float, max_steps: int, progress: Progress | None
@@ -97,11 +101,9 @@ class EquilibriumSearch:
 
     def __init__(self, model: CompiledScene, t: float) -> None:
         self._model, self._t = model, t
-        mobility = (
-            len(model.free_speed_indices)
-            if model.loop_start is None
-            else model.loop_start.loops.mobility
-        )
+        mobility = len(model.free_speed_indices)
+        if model.loop_start is not None:
+            mobility = model.loop_start.loops.mobility
         self._is_driven = mobility == 0  # drives and loops alone determine the state
         self._has_few_independent = mobility <= MAX_INDEPENDENT
         self._is_small = mobility <= (
@@ -304,22 +306,17 @@ class EquilibriumSearch:
             return {}
         if self._light_search is None or self._difference_problem is not None:
             assert self._difference_problem is not None
-            places, efforts = (
-                self._difference_problem.coordinate_indices,
-                self._difference_problem.required_efforts(q),
-            )
-            return {
-                model.coordinate_layout.u_name(j): float(x)
-                for j, x in zip(places, efforts, strict=True)
-            }
-        stiffness = self._light_search.stiffness
-        if freedom is None or not self._has_few_independent:
+            places = self._difference_problem.coordinate_indices
+            efforts = self._difference_problem.required_efforts(q)
+        elif freedom is None or not self._has_few_independent:
+            stiffness = self._light_search.stiffness
             cut_speeds, missing = set(stiffness.closing_speeds.tolist()), stiffness.residual(q)
             places = tuple(j for j in model.free_speed_indices if j not in cut_speeds)
             efforts = missing[list(places)]
         else:
             places = freedom.select(q)
-            efforts = freedom.motion_matrix(q, places).T @ stiffness.residual(q)
+            residual = self._light_search.stiffness.residual(q)
+            efforts = freedom.motion_matrix(q, places).T @ residual
         return {
             model.coordinate_layout.u_name(j): float(x)
             for j, x in zip(places, efforts, strict=True)
@@ -330,16 +327,6 @@ def _count_steps(progress: Progress | None) -> Progress | None:
     """Progress callback that counts steps over several searches."""
     steps = itertools.count()
     return None if progress is None else lambda _, length: progress(next(steps), length)
-
-
-def _with_rotors(model: CompiledScene, weight: float) -> LoopedEngine:
-    """Engine of the model with rotors on all hinges, of `weight` times the mass of the scene."""
-    packed = model.packed_scene
-    rotors = weight * (total_mass(model) or 1.0) * (scene_length(model) / speed_scales(model)) ** 2
-    engine = LoopedEngine(packed_system(with_rotors(packed.system, rotors.tolist()), packed))
-    if model.loop_start is not None:
-        LoopCalls(engine, model.loop_start.start[0])  # determines its redundant rows
-    return engine
 
 
 def _tree_problem(model: CompiledScene, t: float, free: list[int]) -> EquilibriumProblem:

@@ -132,7 +132,9 @@ class Session(PublicMembers):
         if status == lib.MSTMM_REFUSED:
             raise self._rejection(int(self._record.refused), dt)
         if status < 0:
-            raise NumericalFailure(self._failure_message())
+            system = shallow(self._system)
+            system.engine = self._current_model().looped  # for a message with the current inputs
+            raise NumericalFailure(stop_message(system, self._run))
 
     def _rejection(self, index: int, dt: object) -> SceneError:
         """Error of a rejected call; new inputs are reset."""
@@ -155,12 +157,6 @@ class Session(PublicMembers):
     def _reset_new_inputs(self) -> None:
         for k, value in enumerate(self._input_values()):
             self._new_inputs[k] = value
-
-    def _failure_message(self) -> str:
-        """Message of a failure, with the current inputs."""
-        system = shallow(self._system)
-        system.engine = self._current_model().looped
-        return stop_message(system, self._run)
 
     def _update_time_map(self, dt: float) -> None:
         """Compute breaks and short signals beyond the end of this tick."""

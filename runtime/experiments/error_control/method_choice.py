@@ -147,17 +147,6 @@ class Family:
             self._vibration if self._vibration is not None and self._vibration.has_motions else None
         )
 
-    @cached_property
-    def _prefers_damping(self) -> bool:
-        """Whether explicit steps should damp their errors at the stability limit.
-
-        If the fastest motions are damped, or their amplitudes are far above the target error.
-        """
-        vibration = self._known_vibration
-        return vibration is not None and (
-            vibration.fastest_damping > TUNING.damping_ratio or vibration.races(self._error)
-        )
-
     @property
     def _fastest_radians(self) -> float:
         """|lambda| T of the fastest motion; 0 if it is known to be slow."""
@@ -212,7 +201,12 @@ class Family:
             statistics = made[-1].statistics  # stability may have set the steps of a stiff scene
             if statistics.stability_limited and statistics.steps > TUNING.stiff_steps:
                 return AUTO
-        prefers_damping = self._prefers_damping
+        # Explicit steps should damp their errors at the stability limit if the fastest motions are
+        # damped, or their amplitudes are far above the target error.
+        vibration = self._known_vibration
+        prefers_damping = vibration is not None and (
+            vibration.fastest_damping > TUNING.damping_ratio or vibration.races(self._error)
+        )
         if not made:
             return _LOOSE_EXPLICIT if prefers_damping else AUTO_EXPLICIT
         min_rtol = TUNING.low_order_rtol

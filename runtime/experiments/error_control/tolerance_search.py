@@ -259,18 +259,13 @@ class ToleranceSearch:
                     f"tolerances from t = {error.divergence_time:.4g} s on (end earlier), and "
                     f"{reason}"
                 )
-        reached = self._achieved_error(
-            best, self._estimated_error(), reason, self._estimate_description()
-        )
+        rtols = [f"{completed.setting.value:.1e}" for completed in self._completed]
+        found = f"by runs with rtol {', '.join(rtols[:-1])} and {rtols[-1]}, the last one kept"
+        if len(rtols) < 2:
+            found = "one run alone, without comparison"
+        reached = self._achieved_error(best, self._estimated_error(), reason, found)
         run = replace(best, achieved_error=reached, notes=(*best.notes, *self._notes))
         return result_of(self._model, self._as_requested(run), error)
-
-    def _estimate_description(self) -> str:
-        """Description of the estimate."""
-        rtols = [f"{completed.setting.value:.1e}" for completed in self._completed]
-        if len(rtols) < 2:
-            return "one run alone, without comparison"
-        return f"by runs with rtol {', '.join(rtols[:-1])} and {rtols[-1]}, the last one kept"
 
     def _achieved_error(
         self, run: Trajectory, known: float | None, why: str, found: str
