@@ -189,7 +189,7 @@ def _savings(state: AdviceState, selected: SelectedSetting) -> tuple[float | Non
     The first compares the given scene with the advised one at the same tolerance, the second the
     default setting with the advised one on the advised scene.
     """
-    setting, tried, rounds = selected.point.setting, selected.trial, state.request.rounds
+    setting, tried = selected.point.setting, selected.trial
     rtol = RTOL if setting.fixed else setting.value
     same_setting = Setting(AUTO, tried.name, rtol)
     default_setting = Setting(METHOD, tried.name, RTOL)
@@ -202,7 +202,7 @@ def _savings(state: AdviceState, selected: SelectedSetting) -> tuple[float | Non
         if model.scene == tried.scene and before == after:
             saving = 1.0
         elif model.model is not None:
-            times = compare_cpu_times(model, before, tried, after, state.runner, rounds)
+            times = compare_cpu_times(state, (model, before), (tried, after))
             saving = None if times is None else times[0] / times[1]
         savings.append(saving)
     return savings[0], savings[1]

@@ -141,16 +141,13 @@ def _select_setting(
         is_accurate = tried.error <= TUNING.accurate_error * state.request.error
         return TUNING.accurate_time_factor if is_accurate else TUNING.time_factor
 
-    others = sorted(
-        (
-            tried
-            for tried in state.runner.results
-            if search.choices_by_name.get(tried.name, choices) != choices
-            and tried.error <= state.error_budget
-            and tried.cpu_s <= time_factor(tried) * best.cpu_s
-        ),
-        key=lambda tried: tried.cpu_s,
-    )
+    others = [
+        tried
+        for tried in sorted(state.runner.results, key=lambda tried: tried.cpu_s)
+        if search.choices_by_name.get(tried.name, choices) != choices
+        and tried.error <= state.error_budget
+        and tried.cpu_s <= time_factor(tried) * best.cpu_s
+    ]
     if not state.runner.span.is_whole_run:
         selected = whole_run_tolerance(best, state, TUNING.total_error * available - best.error)
         if selected is not None:
@@ -163,14 +160,7 @@ def _select_setting(
     seconds = max(TUNING.method_budget * state.request.budget, state.budget.remaining())
     max_error, growth = TUNING.total_error * available, state.runner.span.growth
     try:
-        return cheapest_setting(
-            finalists,
-            state.runner,
-            max_error / growth,
-            state.request.of,
-            state.request.rounds,
-            seconds,
-        )
+        return cheapest_setting(finalists, state, max_error / growth, seconds)
     except NumericalFailure:  # keep the setting of the trial runs
         setting = Setting(AUTO, best.name, state.runner.rtol)
         return SelectedSetting(best, Point(setting, best.error / growth, best.cpu_s, 1))

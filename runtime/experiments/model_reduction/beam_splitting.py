@@ -238,7 +238,18 @@ def _prepare_splitting(
 
     If these changes alter the motion too much, their beams are removed from `steep`.
     """
-    scene, changes = _splittable_scene(base.scene, steep, evidence)
+    changes = {}
+
+    def splittable(beam: Beam) -> Beam:
+        if beam.name not in steep:
+            return beam
+        changed, change = make_splittable(beam, evidence[beam.name].frequency)
+        if change:
+            changes[beam.name] = change
+        return changed
+
+    beams = tuple(map(splittable, base.scene.beam))
+    scene = with_tables(base.scene, beam=beams) if changes else base.scene
     if not changes:
         return scene, state.runner.finer(scene, state.runner.names, base.name), ()
     run = state.runner.finer(scene, state.runner.names, "splittable beams")
@@ -257,24 +268,6 @@ def _prepare_splitting(
     ]
     steep -= {*changes}
     return base.scene, state.runner.finer(base.scene, state.runner.names, base.name), ()
-
-
-def _splittable_scene(
-    scene: Scene, steep: set[str], evidence: Mapping[str, ErrorPrediction]
-) -> tuple[Scene, dict[str, str]]:
-    """The scene with splittable beams, and the change of each beam in words."""
-    changes = {}
-
-    def splittable(beam: Beam) -> Beam:
-        if beam.name not in steep:
-            return beam
-        changed, change = make_splittable(beam, evidence[beam.name].frequency)
-        if change:
-            changes[beam.name] = change
-        return changed
-
-    beams = tuple(map(splittable, scene.beam))
-    return with_tables(scene, beam=beams) if changes else scene, changes
 
 
 def _refine_parts(

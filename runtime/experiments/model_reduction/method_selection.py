@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -19,7 +20,7 @@ from ..runs import Runs
 from ..trial import Setting, max_error
 from ..tuning import REDUCTION as TUNING
 from .scene_edits import rename_reference
-from .trial_models import TrialResult, TrialRunner
+from .trial_models import TrialResult
 
 if TYPE_CHECKING:
     from .advice_state import AdviceState
@@ -39,18 +40,14 @@ class SelectedSetting:
 
 
 def cheapest_setting(
-    finalists: list[TrialResult],
-    bench: TrialRunner,
-    target_error: float,
-    of: tuple[str, ...],
-    rounds: int,
-    seconds: float,
+    finalists: list[TrialResult], state: AdviceState, target_error: float, seconds: float
 ) -> SelectedSetting:
     """Cheapest setting of any of these models with an error of at most `target_error`.
 
     The first model is the smallest.  `seconds` limits the wall-clock time.  Raises NumericalFailure
     if no setting reaches the error.
     """
+    bench, rounds = state.runner, state.request.rounds
     budget = Budget(seconds, bench.budget.clock)
     runs = Runs(bench.span.t_end, np.array(bench.runs.times), budget)
     survey = Survey(bench.reference, bench.measure, runs, bench.report)
@@ -60,11 +57,10 @@ def cheapest_setting(
     for tried in finalists:
         model, enough = tried.compiled_model, TUNING.sufficient_error * target_error
         names = bench.measure.names_of(model)
-        quantities = tuple(rename_reference(name, names) for name in of)
+        quantities = tuple(rename_reference(name, names) for name in state.request.of)
         model_error = model_errors[tried.name]
-        setting = _setting_for_error(
-            tried, runs, quantities, TUNING.integration_error * (target_error - model_error)
-        )
+        integration_error = TUNING.integration_error * (target_error - model_error)
+        setting = _setting_for_error(tried, runs, quantities, integration_error)
         if setting is not None:
             curves.append(Curve(setting.method, tried.name, model, enough, "", iter((setting,))))
         curves += [
@@ -73,11 +69,8 @@ def cheapest_setting(
         ]
     survey.run_curves(curves, EARLY)
     points = bound_errors(survey.points, reference)
-    sufficient = [
-        i
-        for i, point in enumerate(points)
-        if point.error_bound is not None and point.error_bound <= target_error
-    ]
+    bounds = [math.inf if point.error_bound is None else point.error_bound for point in points]
+    sufficient = [i for i, bound in enumerate(bounds) if bound <= target_error]
     if not sufficient:
         raise NumericalFailure(f"no setting reaches an error of {target_error:.1e}")
     smallest_name = finalists[0].name
@@ -109,21 +102,17 @@ def _setting_for_error(
 
 
 def compare_cpu_times(
-    a: TrialResult,
-    setting: Setting,
-    b: TrialResult,
-    other: Setting,
-    bench: TrialRunner,
-    rounds: int,
+    state: AdviceState, *settings: tuple[TrialResult, Setting]
 ) -> tuple[float, float] | None:
     """CPU times of two runs in alternating rounds, s; None if one fails or takes too long."""
-    points, models = [], [a.compiled_model, b.compiled_model]
-    for model, model_setting in zip(models, (setting, other), strict=True):
-        trial = bench.runs.trial(model, model_setting, bench.measure, bench.budget.remaining() / 2)
+    bench, points = state.runner, []
+    models = [tried.compiled_model for tried, _ in settings]
+    for model, (_, setting) in zip(models, settings, strict=True):
+        trial = bench.runs.trial(model, setting, bench.measure, bench.budget.remaining() / 2)
         if trial.numbers is None:
             return None
-        points.append(Point(model_setting, 0.0, trial.cpu_s, 1))
-    timed, _ = repeat_timings(points, models, rounds, bench.runs, bench.report)
+        points.append(Point(setting, 0.0, trial.cpu_s, 1))
+    timed, _ = repeat_timings(points, models, state.request.rounds, bench.runs, bench.report)
     first, second = (point.cpu_s or 0.0 for point in timed)
     return first, second
 

@@ -71,16 +71,8 @@ class Change:
 
 def apply_changes(scene: Scene, changes: Sequence[Change]) -> ExpandedScene:
     """The scene with these changes; chains with changed members are expanded."""
-    new_hinges = {
-        change.name: change.replacement
-        for change in changes
-        if isinstance(change.replacement, Hinge)
-    }
-    new_chains = {
-        change.name: change.replacement
-        for change in changes
-        if isinstance(change.replacement, Chain)
-    }
+    new_hinges = {c.name: c.replacement for c in changes if isinstance(c.replacement, Hinge)}
+    new_chains = {c.name: c.replacement for c in changes if isinstance(c.replacement, Chain)}
     omitted_springs = {change.name for change in changes if change.replacement is None}
     changed = with_tables(
         scene,
@@ -204,42 +196,25 @@ def omission_changes(scene: Scene) -> list[Change]:
         for chain in expandable_chains(scene)
     }
     chain_hinges = {name for names in hinges_of_chains.values() for name in names}
-    change_by_hinge = {
-        name: Change(
-            f'hinge "{name}"',
-            _omission_text(_passive_law_names(hinge.law)),
-            0.0,
-            hinge.name,
-            _remove_passive_law(hinge),
-        )
-        for name, hinge in _hinges(scene)
-        if _has_passive_law(hinge)
-    }
+    change_by_hinge = {}
+    for name, hinge in _hinges(scene):
+        if _has_passive_law(hinge):
+            text = _omission_text(_passive_law_names(hinge.law))
+            rest = _remove_passive_law(hinge)
+            change_by_hinge[name] = Change(f'hinge "{name}"', text, 0.0, hinge.name, rest)
     changes = [change for name, change in change_by_hinge.items() if name not in chain_hinges]
     for chain in scene.chain:
-        if any(_has_passive_law(hinge) for hinge in chain.hinge):
-            hinges = tuple(
-                _remove_passive_law(hinge) if _has_passive_law(hinge) else hinge
-                for hinge in chain.hinge
-            )
-            omitted = dict.fromkeys(
-                name for hinge in chain.hinge for name in _passive_law_names(hinge.law)
-            )
-            parts = tuple(
-                change_by_hinge[name]
-                for name in hinges_of_chains.get(chain.name, ())
-                if name in change_by_hinge
-            )
+        if any(map(_has_passive_law, chain.hinge)):
+            hinges = [_remove_passive_law(h) if _has_passive_law(h) else h for h in chain.hinge]
+            omitted = dict.fromkeys(n for h in chain.hinge for n in _passive_law_names(h.law))
+            members = hinges_of_chains.get(chain.name, ())
             changes.append(
                 Change(
-                    f'chain "{chain.name}"',
-                    _omission_text(omitted),
-                    0.0,
-                    chain.name,
-                    chain.model_copy(update={"hinge": hinges}),
-                    parts,
+                    f'chain "{chain.name}"', _omission_text(omitted), 0.0, chain.name,
+                    chain.model_copy(update={"hinge": tuple(hinges)}),
+                    tuple(change_by_hinge[name] for name in members if name in change_by_hinge),
                 )
-            )
+            )  # fmt: skip
     changes += [
         Change(f'spring "{spring.name}"', "left out, negligible effect", 0.0, spring.name)
         for spring in scene.spring
