@@ -9,13 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 
 import mstmm
-from mstmm.runtime.experiments.budget import EARLY, SETTINGS, Budget
 from mstmm.runtime.experiments.chart.chart_record import Point, Reference, Skipped
 from mstmm.runtime.experiments.chart.method_survey import Survey, method_curve
 from mstmm.runtime.experiments.error_measure import select_measure
 from mstmm.runtime.experiments.method_families import FAMILIES, PROMISING, all_methods, family
 from mstmm.runtime.experiments.reference import compute_reference
-from mstmm.runtime.experiments.runs import Runs
+from mstmm.runtime.experiments.runs import EARLY, SETTINGS, Budget, Runs
 from mstmm.runtime.experiments.trial import Setting
 
 from ..common import measure

@@ -17,10 +17,9 @@ import numpy as np
 
 from mstmm.errors import NumericalFailure
 
-from .budget import REFERENCE
 from .error_measure import Measure
 from .method_families import family
-from .runs import Report, Runs
+from .runs import REFERENCE, Report, Runs
 from .trial import Setting, Trial, max_error
 from .tuning import CHART, REDUCTION
 

@@ -16,12 +16,11 @@ from mstmm.errors import EnvironmentFailure, MstmmError, SceneError
 
 from ...integrate.steppers import AUTO
 from ...platform_support.safe_files import write_text
-from ..budget import EARLY, REFERENCE, SETTINGS, Budget
 from ..error_measure import Measure, select_measure
 from ..method_families import PROMISING, require_methods, without_index3_duplicates
 from ..model_levels import Variant, model_levels, planar_level
 from ..reference import Converged, compute_reference
-from ..runs import Compile, Report, Runs, scene_warnings
+from ..runs import EARLY, REFERENCE, SETTINGS, Budget, Compile, Report, Runs, scene_warnings
 from ..trial import Setting, Trial, max_error
 from ..tuning import CHART as TUNING
 from .chart_record import ChartRecord, Level, Reference, Skipped, bound_errors, split_warnings

@@ -13,10 +13,9 @@ from mstmm.errors import MstmmError, SceneError
 
 from ...integrate.steppers import AUTO
 from ...result.checks.flexible import MAX_SLOPE
-from ..budget import Budget
 from ..error_measure import PositionMeasure
 from ..model_levels import with_model_level
-from ..runs import Runs
+from ..runs import Budget, Runs
 from ..trial import Setting
 from ..tuning import REDUCTION as TUNING
 from .body_models import ErrorPrediction, predict_errors

@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING
 from mstmm.errors import NumericalFailure
 
 from ...integrate.steppers import AUTO
-from ..budget import Budget
 from ..chart.chart_record import Point
 from ..error_measure import scene_length_with_ends, select_measure
 from ..model_levels import Variant, model_levels
-from ..runs import Compile, Report
+from ..runs import Budget, Compile, Report
 from ..trial import Setting
 from ..tuning import REDUCTION as TUNING
 from .advice import Advice

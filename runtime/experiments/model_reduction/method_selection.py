@@ -11,12 +11,11 @@ import numpy as np
 from mstmm.errors import NumericalFailure
 
 from ...integrate.steppers import AUTO
-from ..budget import ALL, EARLY, Budget
 from ..chart.chart_record import Point, Reference, bound_errors, recommend
 from ..chart.method_survey import Curve, Survey, method_curve, repeat_timings
 from ..method_families import PROMISING
 from ..run_request import ErrorRequest
-from ..runs import Runs
+from ..runs import ALL, EARLY, Budget, Runs
 from ..trial import Setting, max_error
 from ..tuning import REDUCTION as TUNING
 from .scene_edits import rename_reference

@@ -16,10 +16,9 @@ from mstmm.numerics.rotations import Vector
 from mstmm.scene import Scene
 
 from ...integrate.steppers import AUTO
-from ..budget import Budget
 from ..error_measure import Measure
 from ..reference import agreeing_runs
-from ..runs import Compile, Report, Runs
+from ..runs import Budget, Compile, Report, Runs
 from ..trial import Setting, Trial, max_error
 from ..tuning import REDUCTION as TUNING
 from .scene_edits import rename_reference

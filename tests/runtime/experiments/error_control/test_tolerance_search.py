@@ -15,7 +15,7 @@ from scipy.special import ellipj, ellipk
 
 import mstmm
 from mstmm.runtime.experiments.error_control import method_choice, tolerance_search
-from mstmm.runtime.experiments.error_control.initial_vibration import starts_vibrating
+from mstmm.runtime.experiments.error_control.method_choice import starts_vibrating
 from mstmm.runtime.experiments.tuning import ERROR_CONTROL
 from mstmm.runtime.integrate.c_loop import Statistics, Status
 from mstmm.runtime.integrate.settings import Settings

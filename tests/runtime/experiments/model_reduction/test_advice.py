@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 import mstmm
-from mstmm.runtime.experiments.budget import Budget
 from mstmm.runtime.experiments.model_reduction.advice_state import advice_request
 from mstmm.runtime.experiments.model_reduction.advise import make_advice
 from mstmm.runtime.experiments.model_reduction.body_models import body_predictions
 from mstmm.runtime.experiments.model_reduction.trial_models import ComparisonWindow
+from mstmm.runtime.experiments.runs import Budget
 from tests.support.scenes.advice import TIP, hub_and_beam, period
 from tests.support.scenes.chart import Clock, hub, pendulum
 

@@ -9,8 +9,11 @@ import pytest
 
 import mstmm
 from mstmm.runtime.experiments.error_control.error_extrapolation import Kind
-from mstmm.runtime.experiments.error_control.initial_vibration import Vibration, initial_vibration
-from mstmm.runtime.experiments.error_control.method_choice import Family
+from mstmm.runtime.experiments.error_control.method_choice import (
+    Family,
+    Vibration,
+    initial_vibration,
+)
 from mstmm.runtime.integrate.settings import Settings
 
 _ASKED = 1e-6

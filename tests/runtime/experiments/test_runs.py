@@ -11,10 +11,9 @@ import pytest
 
 import mstmm
 from mstmm.errors import NumericalFailure
-from mstmm.runtime.experiments.budget import EARLY, REFERENCE, SETTINGS, Budget
 from mstmm.runtime.experiments.chart.chart import Chart, chart_request, make_chart
 from mstmm.runtime.experiments.error_measure import Coordinates
-from mstmm.runtime.experiments.runs import Runs
+from mstmm.runtime.experiments.runs import EARLY, REFERENCE, SETTINGS, Budget, Runs
 from mstmm.runtime.experiments.trial import Setting
 from mstmm.runtime.platform_support.interrupts import record_interrupts
 from mstmm.runtime.run.integration_run import advance
