@@ -291,10 +291,6 @@ def _power(args: list[Enclosure], exponent: float | None) -> Enclosure:
     return Enclosure(value, value * rate)
 
 
-def _multiply(v: list[Interval], d: list[Interval]) -> Enclosure:
-    return Enclosure(v[0] * v[1], d[0] * v[1] + v[0] * d[1])
-
-
 def _divide(v: list[Interval], d: list[Interval]) -> Enclosure:
     value = v[0] / v[1]
     return Enclosure(value, (d[0] - value * d[1]) / v[1])
@@ -383,7 +379,7 @@ _COMBINED: dict[str, _Combined] = {
     "neg": lambda v, d: Enclosure(-v[0], -d[0]),
     "add": lambda v, d: Enclosure(v[0] + v[1], d[0] + d[1]),
     "sub": lambda v, d: Enclosure(v[0] - v[1], d[0] - d[1]),
-    "mul": _multiply,
+    "mul": lambda v, d: Enclosure(v[0] * v[1], d[0] * v[1] + v[0] * d[1]),
     "div": _divide,
     "sign": _sign,
     "abs": _abs,

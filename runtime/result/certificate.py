@@ -119,8 +119,30 @@ class Certificate(NotebookDisplay):
         and `balance` (relative, of energy and momentum; None for the bound of the run's own
         tolerance or step).
         """
-        given = None if balance is None else finite_float("balance", balance, "a number")
-        return _verdict(self, finite_float("accuracy", accuracy, "a number in rad"), given)
+        balance_bound = self.step_control.bound
+        if balance is not None:
+            balance_bound = finite_float("balance", balance, "a number")
+        accuracy = finite_float("accuracy", accuracy, "a number in rad")
+        objections = list(self.failures) + [
+            f"{d.name} drifts by {d}, more than the requested bound {balance_bound:g}"
+            for d in (self.energy, *self.momentum)
+            if balance_bound < d.relative <= self.step_control.bound
+        ]
+        missing = []
+        if self.sample_count < 2:
+            missing.append(
+                "the run has only one sample, so that energy and momentum cannot be compared"
+            )
+        if self.error is not None:
+            objections += _error_objections(self.error, accuracy)
+        elif self.achieved_error is None:
+            missing.append("the error was not estimated (use certify=True)")
+        objections += self.objections
+        bounds = f"errors within {accuracy:g} rad or {accuracy:.3g} of the motion"
+        if self.achieved_error is not None:
+            bounds = f"error of {self.achieved_error.quantity} as requested"
+        bounds = f"{bounds}, balances within {balance_bound:g}"
+        return Verdict(tuple(dict.fromkeys(objections)), tuple(missing), bounds)
 
     @property
     def trusted(self) -> bool:
@@ -145,7 +167,16 @@ class Certificate(NotebookDisplay):
     @property
     def error_scope(self) -> str:
         """Scope of the error estimate, and what it does not include."""
-        return _error_scope(self)
+        parts = ["integration in time only, not the assumptions of the scene"]
+        if self.flexible_bodies:
+            parts.append("not the shape functions and frames of flexible bodies (see their rows)")
+        if self.spring_deflection is not None:
+            stiffest = self.spring_deflection
+            parts.append(
+                "not the deflection of springs that replace constraints: up to "
+                f"{stiffest.largest:.1e} m at the stiffest, {stiffest.spring}"
+            )
+        return "; ".join(parts)
 
     def __str__(self) -> str:
         return self.as_text()
@@ -197,47 +228,18 @@ class Certificate(NotebookDisplay):
 # --- verdict --------------------------------------------------------------------------------------
 
 
-def _verdict(c: Certificate, accuracy: float, balance: float | None) -> Verdict:
-    """Verdict within bounds.
-
-    `accuracy` of the error in rad, for coordinates other than angles relative to their range;
-    `balance` of energy and momentum, relative.
-    """
-    balance_bound = c.step_control.bound if balance is None else balance
-    objections = list(c.failures) + [
-        f"{d.name} drifts by {d}, more than the requested bound {balance_bound:g}"
-        for d in (c.energy, *c.momentum)
-        if balance_bound < d.relative <= c.step_control.bound
-    ]
-    missing = []
-    if c.sample_count < 2:
-        missing.append(
-            "the run has only one sample, so that energy and momentum cannot be compared"
+def _error_objections(error: ErrorEstimate, accuracy: float) -> list[str]:
+    """Objections to a failed second run, and to units of q whose error exceeds `accuracy`."""
+    objections = []
+    if error.covered is not None:
+        objections.append(
+            f"the error is unknown after t = {error.covered:.4g} s, where the second run stopped; "
+            "use a shorter run or other tolerances"
         )
-    if c.error is not None:
-        if c.error.covered is not None:
-            objections.append(
-                f"the error is unknown after t = {c.error.covered:.4g} s, where the second run "
-                "stopped; use a shorter run or other tolerances"
-            )
-        objections += _accuracy_objections(c.error, accuracy)
-    elif c.achieved_error is None:
-        missing.append("the error was not estimated (use certify=True)")
-    objections += c.objections
-    bounds = f"errors within {accuracy:g} rad or {accuracy:.3g} of the motion"
-    if c.achieved_error is not None:
-        bounds = f"error of {c.achieved_error.quantity} as requested"
-    bounds = f"{bounds}, balances within {balance_bound:g}"
-    return Verdict(tuple(dict.fromkeys(objections)), tuple(missing), bounds)
-
-
-def _accuracy_objections(error: ErrorEstimate, accuracy: float) -> list[str]:
-    """Objections to units of q whose estimated error over the run exceeds `accuracy`."""
     horizon = ""
     if error.divergence_time is not None:
         horizon = f" (predictable until {error.divergence_time:.4g} s)"
         horizon = " (not predictable from the start)" if error.diverges_at_start else horizon
-    objections = []
     for unit, worst in error.difference("q").items():
         if worst > error_limit(error.excursion, unit, accuracy, accuracy):
             motion = f", with a motion of {error.excursion.get(unit, 0.0):.2g} {unit}"
@@ -288,16 +290,3 @@ def _error_rows(c: Certificate) -> list[tuple[str, str]]:
 
 def _format_errors(errors: dict[str, float]) -> str:
     return ", ".join(f"{value:.1e} {unit or '1'}" for unit, value in errors.items())
-
-
-def _error_scope(c: Certificate) -> str:
-    """Scope of the error estimate, and what it does not include."""
-    parts = ["integration in time only, not the assumptions of the scene"]
-    if c.flexible_bodies:
-        parts.append("not the shape functions and frames of flexible bodies (see their rows)")
-    if c.spring_deflection is not None:
-        parts.append(
-            "not the deflection of springs that replace constraints: up to "
-            f"{c.spring_deflection.largest:.1e} m at the stiffest, {c.spring_deflection.spring}"
-        )
-    return "; ".join(parts)

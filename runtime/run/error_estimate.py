@@ -245,11 +245,8 @@ def excursions(layout: Layout, q: Array, but: str = "") -> dict[str, float]:
 def _horizon(t: Array, q: dict[str, Array], moved: dict[str, float], start: float) -> float | None:
     """Last sample before the runs differ by more than ANGLE or PART, `start` if the first does."""
     limits = {unit: error_limit(moved, unit, ANGLE, PART) for unit in q}
-    first_above = [
-        int(np.argmax(error > SAFETY * limits[unit]))
-        for unit, error in q.items()
-        if (error > SAFETY * limits[unit]).any()
-    ]
+    above = [error > SAFETY * limits[unit] for unit, error in q.items()]
+    first_above = [int(np.argmax(is_above)) for is_above in above if is_above.any()]
     if not first_above:
         return None
     return float(t[min(first_above) - 1]) if min(first_above) else start

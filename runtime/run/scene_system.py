@@ -60,12 +60,12 @@ class SceneSystem:
         model, system = packed.model, packed.system
         self.run = run = ffi.new("mstmm_scene_run *")
         run.model = model
-        does_work = bool(system.laws or system.driven or system.loads or system.forces)
-        does_work = does_work or bool(system.couplings) or bool(packed.event_functions.bounces)
-        does_work = does_work or any(
-            body.D.any() or body.drag is not None for body in packed.flexible.values()
-        )
-        run.with_power = int(with_power and does_work)
+        working = (
+            system.laws, system.driven, system.loads, system.forces, system.couplings,
+            packed.event_functions.bounces,
+            *(body.D.any() or body.drag is not None for body in packed.flexible.values()),
+        )  # fmt: skip
+        run.with_power = int(with_power and any(map(bool, working)))
         run.memory = engine.pointer(self.memory)
         quaternions = np.append(packed.layout.quaternions, 0).astype(np.int32)
         run.quaternions = ffi.from_buffer("int[]", quaternions)
@@ -272,8 +272,8 @@ def _reads_velocities(tape: Tape) -> bool:
 
 
 def _slots_read(tape: Tape) -> set[int]:
-    width = INSTRUCTION_WIDTH
-    rows = [tape.instructions[i : i + width] for i in range(0, len(tape.instructions), width)]
+    starts = range(0, len(tape.instructions), INSTRUCTION_WIDTH)
+    rows = [tape.instructions[i : i + INSTRUCTION_WIDTH] for i in starts]
     return {slot for row in rows for slot in row[2:]} | set(tape.outputs[2::OUTPUT_WIDTH])
 
 

@@ -36,18 +36,11 @@ _MAX_DENSE = 24
 Operator = Callable[[Array], Array]
 
 
-def may_be_fast(scene: Scene, rate: float) -> bool:
-    """True if springs and dampers may cause a motion faster than |lambda| = `rate` (1/s).
-
-    An inexpensive bound that decides whether to compute the fastest motion.
-    """
-    return fastest_possible(scene) > rate
-
-
 def fastest_possible(scene: Scene) -> float:
     """Largest |lambda| (1/s) of any spring or damper on the smallest inertia.
 
-    0 without springs and dampers, inf if an inertia is zero.
+    0 without springs and dampers, inf if an inertia is zero.  An inexpensive bound that decides
+    whether to compute the fastest motion.
     """
     laws = [table.law for table in (*scene.hinge, *(x for c in scene.chain for x in c.hinge))]
     max_k = max([k for law in laws for k in law.stiffness], default=0.0)

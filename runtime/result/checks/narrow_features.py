@@ -324,13 +324,10 @@ def _all_states(run: Trajectory) -> tuple[Array, Array, Array]:
 
 def _step_fractions(run: Trajectory) -> Array | None:
     """Largest part of the interval between two states that one step covers; None without any."""
-    settings, (t, q, _) = run.settings, _all_states(run)
+    t, q, _ = _all_states(run)
     if len(t) < 2 or not np.isfinite(q).all():
         return None
-    intervals = np.diff(t)
-    max_step = settings.step if settings.step is not None else run.statistics.largest_step
-    if settings.output_times is None or max_step is None:
-        return np.ones(len(intervals))
+    intervals, max_step = np.diff(t), _max_step(run)
     return np.divide(max_step, intervals, out=np.ones(len(intervals)), where=intervals > max_step)
 
 

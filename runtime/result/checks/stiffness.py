@@ -21,7 +21,7 @@ from ...integrate.steppers import AUTO, get
 from ...run import classical_run, external_integrators
 from ...run.method_switching import implicit_method
 from ...run.run_execution import RunMonitor, first_run
-from ...run.spectral_radius import fastest_at_start, may_be_fast
+from ...run.spectral_radius import fastest_at_start, fastest_possible
 from .check import Check, RunStart
 from .flexible import squared_frequencies
 
@@ -108,7 +108,7 @@ def _may_be_fast(model: CompiledScene, rate: float) -> bool:
         squared_frequencies(body).max(initial=0.0) > rate * rate
         for body in model.flexible_bodies.values()
     )
-    return may_be_fast(model.scene, rate) or any(fast)
+    return fastest_possible(model.scene) > rate or any(fast)
 
 
 def _is_adaptive_explicit(settings: Settings) -> bool:

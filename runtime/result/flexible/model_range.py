@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -296,27 +297,24 @@ def missed_deflection(flexible: FlexibleBodies, name: str, some: NDArray[np.int6
 #: Largest number of bodies with own rows in the certificate; beyond, only the extremes are shown.
 _MAX_BODY_ROWS = 4
 
+#: Rows of extremes: name, measure and its format.
+_EXTREMES = (
+    ("largest slope", "slope", ".2g"), ("largest spin ratio", "spin_ratio", ".2g"),
+    ("largest load ratio", "load_ratio", ".2g"), ("largest strain", "strain", ".1e"),
+    ("missed bending", "tail", ".1e"),
+)  # fmt: skip
+
 
 def rows(ranges: Sequence[ModelRange]) -> list[tuple[str, str]]:
     """Rows of the certificate, (name, text)."""
     if len(ranges) <= _MAX_BODY_ROWS:
         return [row for body_range in ranges for row in _body_rows(body_range)]
-    steepest = max(ranges, key=lambda body_range: body_range.slope)
-    fastest = max(ranges, key=lambda body_range: body_range.spin_ratio)
-    loaded = max(ranges, key=lambda body_range: body_range.load_ratio)
-    strains = [body_range for body_range in ranges if body_range.strain is not None]
-    parts = [
-        ("largest slope", f'{steepest.slope:.2g} at "{steepest.name}"'),
-        ("largest spin ratio", f'{fastest.spin_ratio:.2g} at "{fastest.name}"'),
-        ("largest load ratio", f'{loaded.load_ratio:.2g} at "{loaded.name}"'),
-    ]
-    if strains:
-        worst = max(strains, key=lambda body_range: body_range.strain or 0.0)
-        parts.append(("largest strain", f'{worst.strain:.1e} at "{worst.name}"'))
-    tails = [body_range for body_range in ranges if body_range.tail is not None]
-    if tails:
-        worst = max(tails, key=lambda body_range: body_range.tail or 0.0)
-        parts.append(("missed bending", f'{worst.tail:.1e} at "{worst.name}"'))
+    parts = []
+    for title, measure, digits in _EXTREMES:
+        known = [body for body in ranges if getattr(body, measure) is not None]
+        if known:
+            worst = max(known, key=attrgetter(measure))
+            parts.append((title, f'{getattr(worst, measure):{digits}} at "{worst.name}"'))
     return parts
 
 
