@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from .pipeline.compilation import generate_file, register
     from .pipeline.equations import equations
     from .pipeline.experiments import advise, chart
-    from .pipeline.report.report import write_report
+    from .pipeline.report import write_report
     from .runtime.experiments.chart.chart import Chart
     from .runtime.experiments.model_reduction.advice import Advice
     from .runtime.experiments.run_request import ErrorRequest, Execution
@@ -58,7 +58,7 @@ _LAZY = {
     "compile": (".pipeline.compilation", "compile_scene"),
     "register": (".pipeline.compilation", "register"),
     "equations": (".pipeline.equations", "equations"),
-    "write_report": (".pipeline.report.report", "write_report"),
+    "write_report": (".pipeline.report", "write_report"),
     "generate_file": (".pipeline.compilation", "generate_file"),
     "Advice": (".runtime.experiments.model_reduction.advice", "Advice"),
     "Chart": (".runtime.experiments.chart.chart", "Chart"),

@@ -26,15 +26,24 @@ def text(words: object) -> str:
     return escape(escape_control_characters(str(words)))
 
 
-def table(rows: Iterable[Sequence[object]], head: Sequence[str] = ()) -> str:
-    """HTML table of rows; without a head the first cell of each row is its header."""
-    head_cells = "".join(f"<th>{text(cell)}</th>" for cell in head)
-    lines = [f"<tr>{head_cells}</tr>"] if head else []
-    for row in rows:
-        cells = [f"<td>{text(cell)}</td>" for cell in row]
-        if not head:
-            cells[0] = f"<th>{text(row[0])}</th>"
-        lines.append(f"<tr>{''.join(cells)}</tr>")
+def table(
+    rows: Iterable[Sequence[object]], head: Sequence[str] = (), numbers: Collection[int] = ()
+) -> str:
+    """HTML table of rows; without a head the first cell of each row is its header.
+
+    The columns of the indices `numbers` are aligned to the right.
+    """
+
+    def line(row: Sequence[object], first: str, others: str) -> str:
+        tags = [first, *[others] * (len(row) - 1)]
+        classes = [' class="n"' if k in numbers else "" for k in range(len(row))]
+        cells = zip(tags, classes, row, strict=True)
+        return (
+            f"<tr>{''.join(f'<{tag}{kind}>{text(cell)}</{tag}>' for tag, kind, cell in cells)}</tr>"
+        )
+
+    lines = [line(head, "th", "th")] if head else []
+    lines += [line(row, "td" if head else "th", "td") for row in rows]
     return f'<div class="wide"><table class="rows">{"".join(lines)}</table></div>'
 
 

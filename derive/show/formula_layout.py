@@ -19,8 +19,7 @@ from sympy.matrices.expressions.slice import MatrixSlice
 
 from ..definition.derivation import Factor, Solve, Triangle, Triangular
 from ..definition.notation import Perp, Tilde
-from .entry_names import AuthorName
-from .symbol_names import SymbolName, parse_author_name, parse_name
+from .symbol_names import AuthorName, SymbolName, parse_author_name, parse_name
 from .vector_recognition import SymbolPart, recognise_matrix
 
 

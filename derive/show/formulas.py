@@ -9,7 +9,7 @@ from dataclasses import replace
 import sympy as sp
 
 from .formula_layout import Name, Node, Row, Sign, Table, Word, entry_index, equation, layout
-from .formula_width import TextWidth
+from .line_breaking import TextWidth
 from .plain_text import text_box
 from .symbol_names import parse_name
 from .vector_recognition import recognise_matrix

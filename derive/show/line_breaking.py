@@ -1,4 +1,4 @@
-"""Width of formulas on paper, and line breaks of formulas wider than the page."""
+"""Width limits of formulas, and line breaks of formulas wider than the page."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from .formula_layout import Fence, Fraction, Name, Node, Root, Row, Sign, Superscript, Word
+from .plain_text import text_box
 
 #: Text width in points at a font size of 10 points (LaTeX's article).
 PAGE_WIDTH = 338.0
@@ -145,3 +146,39 @@ def _flatten_atoms(node: Node, room: float) -> Iterator[Node]:
 
 def _parenthesise(node: Node) -> Node:
     return Fence("(", node, ")") if isinstance(node, Row) and len(node.items) > 1 else node
+
+
+# --- width limits: columns in text, points on paper -----------------------------------------------
+
+#: A block wider than this in text is named and defined below the matrix.
+CELL_WIDTH = 20
+#: A formula wider than this in text is written entry by entry.
+FORMULA_WIDTH = 96
+#: Explicit matrices wider than this inside a formula that does not fit are named.
+INNER_WIDTH = 16
+
+
+class TextWidth:
+    """Width limits of text pages, in columns."""
+
+    def line(self, node: Node) -> bool:
+        """Whether a formula fits on one line."""
+        return text_box(node).width <= FORMULA_WIDTH
+
+    def cell(self, node: Node, columns: int) -> bool:
+        """Whether a block fits in a matrix with this number of columns."""
+        return len(text_box(node).lines) == 1 and text_box(node).width <= CELL_WIDTH
+
+    def fits_inside(self, node: Node) -> bool:
+        """Whether a matrix may stay inside a formula that does not fit."""
+        return text_box(node).width <= INNER_WIDTH
+
+
+class PaperWidth(TextWidth):
+    """Width limits of paper pages, in points."""
+
+    def line(self, node: Node) -> bool:
+        return node_width(node) <= PAGE_WIDTH
+
+    def cell(self, node: Node, columns: int) -> bool:
+        return super().cell(node, columns) and (columns + 1) * (node_width(node) + 10) <= PAGE_WIDTH

@@ -36,10 +36,10 @@ from ..schedule.pass_steps import (
 from ..schedule.slot_definitions import CONSTANTS, SLOTS, TRAITS
 from ..schedule.sweeps import SWEEPS
 from .document import Code, FormulaWriter, Heading, Item, Paragraph
-from .entry_names import DeclaredNames
-from .formula_width import TextWidth
+from .line_breaking import TextWidth
 from .plain_text import WIDTH
 from .show_page import FORMATS, render_page
+from .symbol_names import DeclaredNames
 
 #: Introduction of the page.
 _EXPLANATION = (

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from html import escape
 
 from mstmm.errors import ElementError
+from mstmm.html_page import html_page
 
 from .captions import caption_text, split_caption
 from .document import (
@@ -27,17 +28,15 @@ from .document import (
     document,
 )
 from .formula_layout import Name, Node, Row, Word, equation
-from .formula_width import PaperWidth, TextWidth
-from .latex import escape_latex, latex_text, latex_unit
-from .line_breaking import PaperLine, paper_lines
-from .mathml import html_page, mathml
+from .line_breaking import PaperLine, PaperWidth, TextWidth, paper_lines
+from .markup import STYLE, escape_latex, latex_text, latex_unit, mathml
 from .plain_text import WIDTH, column_count, pad_columns, text_box, wrap_formula
 from .symbol_names import unit_text
 
 #: Labels of source paragraphs, by their kind.
 _SOURCE_LABELS = {"sources": "Source: ", "sweep": "Source of the sweep: "}
 
-__all__ = ["FORMATS", "STAGES", "ElementView", "show", "show_view"]
+__all__ = ["FORMATS", "STAGES", "STYLE", "ElementView", "html_body", "show", "show_view"]
 
 
 def show(element: str, at: str, format: str, registry: Callable[[str], ElementView]) -> str:
@@ -240,7 +239,16 @@ def _aligned_line(part: PaperLine) -> str:
 
 
 def _html_page(title: str, items: list[Item]) -> str:
-    return html_page(title, "\n".join(_html_item(item) for item in items))
+    return html_page(title, _html_body(items), STYLE, dark=True)
+
+
+def html_body(view: ElementView) -> str:
+    """Equations of a view as HTML without the page around them; their rules are `STYLE`."""
+    return _html_body(document(view, "equations", PaperWidth()))
+
+
+def _html_body(items: list[Item]) -> str:
+    return "\n".join(_html_item(item) for item in items)
 
 
 def _html_item(item: Item) -> str:

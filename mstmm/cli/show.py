@@ -88,8 +88,8 @@ def _schedule_page(at: str, format: str) -> str:
 
 
 def _comparison_page(element: str, format: str) -> str:
-    from mstmm.derive.show.classical_comparison import classical_comparison
     from mstmm.derive.show.show_page import render_page
+    from mstmm.derive.show.subjects import classical_comparison
 
     return render_page(
         *classical_comparison("_".join(stored_elements.find_element(element))), format
@@ -171,7 +171,7 @@ def _view_from_store(kind: str, name: str, at: str) -> ElementView:
 
 def _view_from_spec(spec: ElementSpec, source: str) -> ElementView:
     from mstmm.derive.show.document import ElementView
-    from mstmm.derive.show.entry_names import spec_names
+    from mstmm.derive.show.symbol_names import spec_names
 
     return ElementView(
         f"{spec.kind}_{spec.name}",

@@ -23,8 +23,8 @@ from ..derive.show.document import (
     document,
 )
 from ..derive.show.formula_layout import layout
-from ..derive.show.formula_width import TextWidth
 from ..derive.show.formulas import equation_lines
+from ..derive.show.line_breaking import TextWidth
 from ..derive.show.show_page import render_page
 from ..derive.show.subjects import element_view, view_of_element
 from ..display import NotebookDisplay

@@ -11,7 +11,7 @@ import sympy as sp
 
 from mstmm.derive.definition.derivation import Derivation, Equation, Quantity, Solve
 from mstmm.derive.lower.kernel_lowering import lower
-from mstmm.derive.show.ir_text import kernel_listing
+from mstmm.derive.show.document import kernel_listing
 from mstmm.derive.verification.equation_evaluation import evaluate_equations
 from mstmm.derive.verification.kernel_evaluation import evaluate
 from mstmm.derive.verification.rounding_bounds import rounding_bounds

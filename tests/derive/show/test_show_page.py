@@ -16,8 +16,7 @@ from mstmm.derive.definition.derivation import Derivation, Equation, Quantity, S
 from mstmm.derive.definition.notation import Matrix, Tilde, explicit
 from mstmm.derive.equations.rigid_body import rigid_body
 from mstmm.derive.show.formula_layout import layout
-from mstmm.derive.show.latex import latex_text
-from mstmm.derive.show.mathml import mathml
+from mstmm.derive.show.markup import latex_text, mathml
 from mstmm.derive.show.plain_text import WIDTH, column_count, wrap_formula
 from mstmm.derive.show.show_page import FORMATS, STAGES, ElementView, show, show_view
 from mstmm.derive.show.symbol_names import SymbolName, parse_name, unit_text

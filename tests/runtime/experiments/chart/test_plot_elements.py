@@ -17,16 +17,14 @@ from mstmm.errors import NumericalFailure, SceneError
 from mstmm.runtime.experiments.chart.chart import Chart
 from mstmm.runtime.experiments.chart.chart_record import Point, Skipped
 from mstmm.runtime.experiments.chart.plot_elements import (
+    MARKS,
     build_drawing,
     decades,
-    plot_position,
-    time_text,
-)
-from mstmm.runtime.experiments.chart.plot_styles import (
-    MARKS,
     family_mark,
     level_colours,
     method_styles,
+    plot_position,
+    time_text,
 )
 from mstmm.runtime.experiments.chart.tables import skip_reasons
 from mstmm.runtime.experiments.method_families import FAMILIES, all_methods, family

@@ -13,7 +13,7 @@ from PIL import Image
 import mstmm
 from mstmm import display
 from mstmm.errors import SceneError
-from mstmm.pipeline.report import summary_tables
+from mstmm.pipeline.report import verdict_html
 from tests.support.scenes import view as scenes
 from tests.support.view import browser
 from tests.support.view.picture_comparison import blocks, matches_picture
@@ -88,7 +88,7 @@ def test_it_tells_how_many_digits_hold_until_when() -> None:
     assert error is not None
     share = error.largest("q")["rad"] / np.ptp(run.q[:, 0])
     said = r"Up to t = 2 s a second.* by at most (\S+) rad, which is (\d+) digits of"
-    found = re.search(said, summary_tables.verdict_html(run))
+    found = re.search(said, verdict_html(run))
     assert found is not None
     assert float(found[1]) == pytest.approx(error.largest("q")["rad"], rel=0.05)
     assert 10.0 ** -(int(found[2]) + 1) < share <= 10.0 ** -int(found[2])

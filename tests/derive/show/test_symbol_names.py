@@ -16,10 +16,10 @@ from mstmm.derive.equations.rigid_body import newton_euler_form
 from mstmm.derive.equations.user_body import bias_load, inertia
 from mstmm.derive.show.captions import split_caption
 from mstmm.derive.show.document import ElementView
-from mstmm.derive.show.entry_names import declared_names
 from mstmm.derive.show.plain_text import text_box
 from mstmm.derive.show.show_page import show_view
 from mstmm.derive.show.subjects import element_view, view_of_element
+from mstmm.derive.show.symbol_names import declared_names
 from mstmm.derive.verification.definition_checks import check_element
 from tests.support.latex import problems
 

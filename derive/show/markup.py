@@ -1,4 +1,4 @@
-"""Layout trees as presentation MathML, and the HTML page: one file, no script."""
+"""Layout trees as LaTeX (amsmath) and as presentation MathML."""
 
 from __future__ import annotations
 
@@ -8,26 +8,109 @@ from html import escape
 from .formula_layout import Fence, Fraction, Name, Node, Root, Row, Sign, Superscript, Table, Word
 from .symbol_names import GREEK, SymbolName
 
+# --- LaTeX ----------------------------------------------------------------------------------------
+
+_SIGN_COMMANDS = {
+    "−": "-", "≤": r"\le ", "≥": r"\ge ", "≠": r"\ne ", " ": r"\,", "·": r"\cdot ",
+}  # fmt: skip
+_WORD_COMMANDS = {
+    "∼": r"\sim", "⊥": r"\perp", "π": r"\pi", "T": r"\mathsf{T}", "−1": "-1", "I": "I",
+    "−T": r"-\mathsf{T}", "∫": r"\textstyle\int",
+}  # fmt: skip
+_FUNCTIONS = {"sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "log", "max", "min"}
+_TEXT_ESCAPES = {
+    "\\": r"\textbackslash{}", "{": r"\{", "}": r"\}", "_": r"\_", "%": r"\%", "&": r"\&",
+    "#": r"\#", "$": r"\$", "^": r"\textasciicircum{}", "~": r"\textasciitilde{}",
+    "<": r"\textless{}", ">": r"\textgreater{}", "–": "--", "·": r"$\cdot$", "…": r"\dots{}",
+    "≤": r"$\le$", "≥": r"$\ge$", "²": r"$^2$", "³": r"$^3$", "−": r"$-$",
+    "×": r"$\times$", "\u2003": r"\quad{}",
+}  # fmt: skip
+#: Matrices with more columns than this use narrower spacing.
+_MAX_WIDE_COLUMNS = 5
+
+
+def escape_latex(text: str) -> str:
+    """Plain text safe in a LaTeX paragraph."""
+    return "".join(_TEXT_ESCAPES.get(c, c) for c in text)
+
+
+def latex_unit(unit: str) -> str:
+    """kg*m2 as kg m^2, upright."""
+    if not unit:
+        return "--"
+    text = escape_latex(unit).replace("*", r"\,")
+    return re.sub(r"(?<=[A-Za-z])(?:\\textasciicircum\{\})?(-?\d+)", r"\\textsuperscript{\1}", text)
+
+
+def latex_name(name: SymbolName, accent: str = "", index: str = "") -> str:
+    """LaTeX of a name with its dots, accent, subscript and index."""
+    core = _base_text(name)
+    core = {0: core, 1: rf"\dot{{{core}}}", 2: rf"\ddot{{{core}}}"}[min(name.dots, 2)]
+    if accent == "tilde":
+        core = rf"\tilde{{{core}}}" if len(name.base) == 1 else rf"\widetilde{{{core}}}"
+    subscript = [_subscript_text(name.subscript)] if name.subscript else []
+    for sign, command in (("…", r"\dots "), ("⟨", r"\langle "), ("⟩", r"\rangle ")):
+        index = index.replace(sign, command)
+    subscript += [index] if index else []
+    tail = f"_{{{','.join(subscript)}}}" if subscript else ""
+    return f"{core}{tail}" + (r"^{\perp}" if accent == "perp" else "")
+
+
+def _base_text(name: SymbolName) -> str:
+    if name.base in GREEK:
+        return "\\" + name.base
+    if name.upright or len(name.base) > 1:
+        return rf"\mathrm{{{name.base}}}".replace("_", r"\_")
+    return name.base
+
+
+def _subscript_text(text: str) -> str:
+    return rf"\mathrm{{{text}}}".replace("_", r"\_") if len(text) > 1 else text
+
+
+def latex_text(node: Node) -> str:
+    """LaTeX of a node, for use inside a formula."""
+    if isinstance(node, Name):
+        return latex_name(node.name, node.accent, node.index)
+    if isinstance(node, Word):
+        return _word_text(node.text)
+    if isinstance(node, Sign):
+        sign = _SIGN_COMMANDS.get(node.text, node.text)
+        return f" {sign} " if node.has_spaces else sign
+    if isinstance(node, Row):
+        return "".join(latex_text(item) for item in node.items)
+    if isinstance(node, Fraction):
+        return rf"\frac{{{latex_text(node.numerator)}}}{{{latex_text(node.denominator)}}}"
+    if isinstance(node, Superscript):
+        return rf"{{{latex_text(node.base)}}}^{{{latex_text(node.exponent)}}}"
+    if isinstance(node, Fence):
+        return rf"\left{node.left}{latex_text(node.body)}\right{node.right}"
+    if isinstance(node, Root):
+        return rf"\sqrt{{{latex_text(node.body)}}}"
+    rows = r" \\ ".join(" & ".join(latex_text(cell) for cell in row) for row in node.rows)
+    if node.cases:
+        return rf"\begin{{cases}} {rows} \end{{cases}}"
+    columns = len(node.rows[0])
+    narrow = r"\arraycolsep3pt" if columns > _MAX_WIDE_COLUMNS else ""
+    return rf"\left[{narrow}\begin{{array}}{{{'c' * columns}}} {rows} \end{{array}}\right]"
+
+
+def _word_text(text: str) -> str:
+    if text in _WORD_COMMANDS:
+        return _WORD_COMMANDS[text]
+    if text in _FUNCTIONS:
+        return "\\" + text
+    if re.fullmatch(r"−?[0-9.]+", text):
+        return text.replace("−", "-")
+    return rf"\text{{{escape_latex(text)}}}"
+
+
+# --- MathML ---------------------------------------------------------------------------------------
+
+#: Rules of formulas and tables of quantities, in addition to those of all pages.
 STYLE = """
-html { color-scheme: light; --ink: #1b1f24; --soft: #57606a; --line: #d5dae0; --page: #fdfdfc;
-  --block: #f4f6f8; --accent: #0a5a8a; }
-@media print { html { color-scheme: light; --ink: #000; --soft: #444; --line: #bbb; --page: #fff;
-  --block: #fff; --accent: #000; } }
-* { box-sizing: border-box; }
-body { margin: 0; background: var(--page); color: var(--ink);
-  font: 16px/1.55 "Source Serif 4", Charter, Georgia, "Times New Roman", serif; }
-main { max-width: 62rem; margin: 0 auto; padding: 2.5rem 1.5rem 4rem; }
-h1 { font-size: 1.7rem; line-height: 1.25; margin: 0 0 .3rem; }
-h2 { font-size: 1.25rem; margin: 2.4rem 0 .8rem; padding-top: .8rem;
-  border-top: 1px solid var(--line); }
-h3 { font-size: 1rem; margin: 1.6rem 0 .5rem; color: var(--accent); }
-p { margin: .4rem 0; } p.note, p.sources { color: var(--soft); font-size: .92rem; }
-.wide { overflow-x: auto; }
-table.quantities tr.inner td:first-child { padding-left: 1.2rem; }
-table.quantities { border-collapse: collapse; width: 100%; font-size: .93rem; }
-table.quantities th { text-align: left; font-weight: 600; color: var(--soft); }
-table.quantities th, table.quantities td { padding: .28rem .8rem .28rem 0;
-  border-bottom: 1px solid var(--line); vertical-align: baseline; }
+p.note, p.sources { color: var(--soft); font-size: .92rem; }
+table.quantities { width: 100%; } table.quantities tr.inner td:first-child { padding-left: 1.2rem; }
 table.quantities td:nth-child(3) { white-space: nowrap; }
 table.quantities code { font-size: .88em; color: var(--soft); }
 figure { margin: .7rem 0; padding: .55rem .9rem; background: var(--block); border-radius: 6px; }
@@ -50,20 +133,9 @@ mtable.matrix { border-left: 1.3px solid; border-right: 1.3px solid;
 mtable.cases { border-left: 1.3px solid; }
 mtable.matrix mtd { padding: .26em .55em; }
 mtable.cases mtd { padding: .26em .7em; text-align: left; }
-pre { background: var(--block); border-radius: 6px; padding: .9rem 1rem; overflow-x: auto;
-  font: 13px/1.5 "JetBrains Mono", "DejaVu Sans Mono", Menlo, Consolas, monospace; }
-@media (max-width: 40rem) { main { padding: 1rem .8rem 2rem; } figure { padding: .4rem .6rem; }
-  table.quantities { font-size: .85rem; } }
-@media print { body { font-size: 11pt; } main { max-width: none; padding: 0; }
-  figure { padding: 0; break-inside: avoid; } pre { white-space: pre-wrap; font-size: 7pt; }
-  math { font-size: 1rem; } h2, h3 { break-after: avoid; }
-  .wide, figure .formula { overflow: visible; } }
-"""
-
-#: Pages with formulas only support dark mode; plots of reports need a white background.
-DARK_STYLE = """
-@media (prefers-color-scheme: dark) { :root { color-scheme: dark; --ink: #e3e6ea; --soft: #9aa4af;
-  --line: #363c44; --page: #15181c; --block: #1e2227; --accent: #6fb5e0; } }
+@media (max-width: 40rem) { figure { padding: .4rem .6rem; } }
+@media print { figure { padding: 0; break-inside: avoid; } math { font-size: 1rem; }
+  figure .formula { overflow: visible; } }
 """
 
 
@@ -145,14 +217,3 @@ def _table_markup(table: Table) -> str:
         for row in table.rows
     )
     return f'<mtable class="{kind}">{rows}</mtable>'
-
-
-def html_page(title: str, body: str) -> str:
-    """A complete HTML page."""
-    return (
-        "<!DOCTYPE html>\n"
-        '<html lang="en">\n<head>\n<meta charset="utf-8"/>\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1"/>\n'
-        f"<title>{escape(title)}</title>\n<style>{DARK_STYLE}{STYLE}</style>\n</head>\n"
-        f"<body>\n<main>\n{body}\n</main>\n</body>\n</html>\n"
-    )

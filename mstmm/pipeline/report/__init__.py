@@ -1,1 +1,0 @@
-"""Self-contained HTML report of a run: quality report, motion, curves and equations."""
