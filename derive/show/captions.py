@@ -127,17 +127,13 @@ def _makes_name(neighbour: tuple[str, str]) -> bool:
 
 def _ends_operand(neighbour: tuple[str, str]) -> bool:
     kind, text = neighbour
-    return kind in ("name", "raised", "article") or (kind == "other" and _closes_group(text))
+    return kind in ("name", "raised", "article") or (
+        kind == "other" and (text in (")", "]") or text.isdigit())
+    )
 
 
 def _begins_operand(neighbour: tuple[str, str]) -> bool:
     kind, text = neighbour
-    return kind in ("name", "article") or (kind == "other" and _opens_group(text))
-
-
-def _closes_group(text: str) -> bool:
-    return text in (")", "]") or text.isdigit()
-
-
-def _opens_group(text: str) -> bool:
-    return text in ("(", "[") or text.isdigit()
+    return kind in ("name", "article") or (
+        kind == "other" and (text in ("(", "[") or text.isdigit())
+    )

@@ -307,10 +307,6 @@ def _c_source_items(view: ElementView) -> list[Item]:
     return [*items, Heading("C", 2), Code(view.c_text().rstrip("\n"))]
 
 
-def _all_ports(kernel: KernelIR) -> tuple[Port, ...]:
-    return (*kernel.inputs, *kernel.outputs)
-
-
 class FormulaWriter:
     """Formulas of a derivation that fit the page, with the declared names."""
 
@@ -329,9 +325,6 @@ class FormulaWriter:
         rows = self.names.labels(array, shape[0]) if shape[1] == 1 else ()
         right = e.right.xreplace(self.named.entries)
         lines = tuple(equation_lines(e.left, right, rows, self.measure))
-        return Formula("" if _repeats_formula(e.name, lines) else e.name, lines, e.source, remark)
-
-
-def _repeats_formula(caption: str, lines: tuple[Node, ...]) -> bool:
-    """Whether a caption only repeats its formula."""
-    return len(lines) == 1 and caption_text(caption).split() == text_box(lines[0]).lines[0].split()
+        first_words = text_box(lines[0]).lines[0].split() if len(lines) == 1 else None
+        is_repeated = caption_text(e.name).split() == first_words
+        return Formula("" if is_repeated else e.name, lines, e.source, remark)

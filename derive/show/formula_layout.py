@@ -7,8 +7,8 @@ below, and each format only renders nine kinds of node.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 
 import sympy as sp
 from sympy.core.function import AppliedUndef
@@ -123,16 +123,10 @@ def equation(left: Node, right: Node) -> Row:
     return Row((left, Sign("=", True), right))
 
 
-def _sort_terms(terms: Sequence[sp.Basic]) -> list[sp.Basic]:
-    """Terms sorted: positive first; matrices by decreasing number of time derivatives."""
-    return sorted(terms, key=lambda term: (_is_negative(term), -_max_dots(term)))
-
-
-def _max_dots(term: sp.Basic) -> int:
-    """Largest number of dots in a matrix term; scalars keep their order."""
-    if not getattr(term, "is_Matrix", False):
-        return 0
-    return max((parse_name(s.name).dots for s in term.atoms(sp.MatrixSymbol)), default=0)
+def _term_order(term: sp.Basic) -> tuple[bool, int]:
+    """Sort key: positive terms first; matrices by decreasing number of time derivatives."""
+    symbols = term.atoms(sp.MatrixSymbol) if getattr(term, "is_Matrix", False) else ()
+    return _is_negative(term), -max((parse_name(s.name).dots for s in symbols), default=0)
 
 
 def _is_negative(term: sp.Basic) -> bool:
@@ -173,7 +167,7 @@ class _Layout:
     def sum(self, e: sp.Basic) -> tuple[Node, int]:
         terms = e.as_ordered_terms() if isinstance(e, sp.Add) else e.args
         items: list[Node] = []
-        for term in _sort_terms(terms):
+        for term in sorted(terms, key=_term_order):
             negative = _is_negative(term)
             if items:
                 items.append(Sign("−" if negative else "+", True))
@@ -234,9 +228,8 @@ class _Layout:
         return Row(_space_factors([inverse, self.with_brackets(e.right, _POWER)])), _PRODUCT
 
     def factor(self, e: Factor) -> tuple[Node, int]:
-        return Row(
-            (Superscript(Word("LDL"), Word("T")), Fence("(", self.node(e.matrix), ")"))
-        ), _ATOM
+        product = Superscript(Word("LDL"), Word("T"))
+        return Row((product, Fence("(", self.node(e.matrix), ")"))), _ATOM
 
     def triangular(self, e: Triangular) -> tuple[Node, int]:
         lower = Row((Word("L"), Fence("(", self.node(e.factor), ")")))
@@ -274,7 +267,8 @@ class _Layout:
         spans = []
         for bounds, extent in zip((e.rowslice, e.colslice), e.parent.shape, strict=True):
             start, stop, _ = bounds
-            spans.append("·" if (start, stop) == (0, extent) else _span_text(start, stop))
+            span = f"{stop}" if stop == start + 1 else f"{start + 1}…{stop}"
+            spans.append("·" if (start, stop) == (0, extent) else span)
         index = ",".join(spans if e.parent.shape[1] != 1 else spans[:1])
         if isinstance(e.parent, sp.MatrixSymbol):
             return Name(parse_name(e.parent.name), "", index), _ATOM
@@ -294,11 +288,7 @@ class _Layout:
         base = self.node(e.expr)
         order = sum(int(count) for _, count in e.variable_count)
         if isinstance(base, Name) and str(e.variables[0]) == "t":
-            base_name = base.name
-            dotted_name = SymbolName(
-                base_name.base, base_name.dots + order, base_name.subscript, base_name.upright
-            )
-            return Name(dotted_name, base.accent, base.index), _ATOM
+            return replace(base, name=replace(base.name, dots=base.name.dots + order)), _ATOM
         above, below = Word("d" if order == 1 else f"d{order}"), Word(f"d{e.variables[0]}")
         return Row((Fraction(above, below), Fence("(", base, ")"))), _PRODUCT
 
@@ -329,10 +319,6 @@ def _space_factors(factors: list[Node]) -> tuple[Node, ...]:
         items += [Sign(" ")] if items else []
         items.append(factor)
     return tuple(items)
-
-
-def _span_text(first: sp.Basic, last: sp.Basic) -> str:
-    return f"{last}" if last == first + 1 else f"{first + 1}…{last}"
 
 
 def element_index(parent: sp.MatrixSymbol, i: int, j: int) -> str:
@@ -367,10 +353,6 @@ def _symbol_layout(_: _Layout, e: sp.Basic) -> tuple[Node, int]:
     return Name(make_name(str(e.name))), _ATOM
 
 
-def _function_layout(_: _Layout, e: AppliedUndef) -> tuple[Node, int]:
-    return Name(parse_name(e.func.__name__)), _ATOM
-
-
 Rule = Callable[[_Layout, sp.Basic], tuple[Node, int]]
 
 _RULES: tuple[tuple[type | tuple[type, ...], Rule], ...] = (
@@ -396,7 +378,7 @@ _RULES: tuple[tuple[type | tuple[type, ...], Rule], ...] = (
     (type(sp.pi), lambda _, e: (Word("π"), _ATOM)),
     (sp.Abs, lambda p, e: (Fence("|", p.node(e.args[0]), "|"), _ATOM)),
     (sp.Derivative, _Layout.derivative),
-    (AppliedUndef, _function_layout),
+    (AppliedUndef, lambda _, e: (Name(parse_name(e.func.__name__)), _ATOM)),
     (sp.Piecewise, _Layout.piecewise),
     (Relational, _Layout.relation),
     ((sp.And, sp.Or), _Layout.logic),

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import replace
 
 import sympy as sp
 
-from .formula_layout import Name, Node, Row, Sign, Table, Word, entry_index, equation, layout
+from .formula_layout import Name, Node, Row, Table, Word, entry_index, equation, layout
 from .line_breaking import TextWidth
 from .plain_text import text_box
 from .symbol_names import parse_name
@@ -169,7 +169,12 @@ class _EquationWriter:
         ):
             return [line]
         if isinstance(value, sp.Piecewise):
-            return [_branch_row(place, *pair) for pair in value.args]
+            rows: list[Node] = []
+            for branch, condition in value.args:
+                separator = Word("   " if condition in (True, sp.true) else "   if ")
+                row = (*equation(place, layout(branch)).items, separator, layout(condition))
+                rows.append(Row(row))
+            return rows
         pieces = list(_outermost_choices(value))
         names = {piece: _indexed_name(place, f"⟨{k}⟩") for k, piece in enumerate(pieces, start=1)}
         lines: list[Node] = [equation(place, layout(value, names))]
@@ -188,10 +193,9 @@ class _EquationWriter:
         if not names:
             return []
         lines: list[Node] = [equation(shown, layout(right, names))]
-        return lines + self.definition_lines(names)
-
-    def definition_lines(self, names: Mapping[sp.Basic, Node]) -> list[Node]:
-        return [line for matrix, name in names.items() for line in self.matrix(name, matrix)]
+        return lines + [
+            line for matrix, name in names.items() for line in self.matrix(name, matrix)
+        ]
 
 
 def _state_blocks(column: sp.MatrixBase) -> Iterator[sp.MatrixBase]:
@@ -217,12 +221,6 @@ def _entry_name(shown: Node, shape: tuple[int, int], i: int, j: int) -> Node:
         index = entry_index(shown.name.code_name(), shape, i, j)
         return Name(shown.name, shown.accent, shown.index + index)
     return Row((shown, Word(f"[{entry_index('', shape, i, j)}]")))
-
-
-def _branch_row(place: Node, value: sp.Basic, condition: sp.Basic) -> Node:
-    separator = "   " if condition in (True, sp.true) else "   if "
-    items = (place, Sign("=", True), layout(value), Word(separator), layout(condition))
-    return Row(items)
 
 
 def _outermost_choices(value: sp.Basic) -> Iterator[sp.Piecewise]:

@@ -48,7 +48,8 @@ def latex_name(name: SymbolName, accent: str = "", index: str = "") -> str:
     core = {0: core, 1: rf"\dot{{{core}}}", 2: rf"\ddot{{{core}}}"}[min(name.dots, 2)]
     if accent == "tilde":
         core = rf"\tilde{{{core}}}" if len(name.base) == 1 else rf"\widetilde{{{core}}}"
-    subscript = [_subscript_text(name.subscript)] if name.subscript else []
+    upright = rf"\mathrm{{{name.subscript}}}".replace("_", r"\_")
+    subscript = [upright if len(name.subscript) > 1 else name.subscript] if name.subscript else []
     for sign, command in (("…", r"\dots "), ("⟨", r"\langle "), ("⟩", r"\rangle ")):
         index = index.replace(sign, command)
     subscript += [index] if index else []
@@ -62,10 +63,6 @@ def _base_text(name: SymbolName) -> str:
     if name.upright or len(name.base) > 1:
         return rf"\mathrm{{{name.base}}}".replace("_", r"\_")
     return name.base
-
-
-def _subscript_text(text: str) -> str:
-    return rf"\mathrm{{{text}}}".replace("_", r"\_") if len(text) > 1 else text
 
 
 def latex_text(node: Node) -> str:
@@ -148,8 +145,9 @@ def mathml(node: Node, display: bool = True) -> str:
 def name_markup(name: SymbolName, accent: str = "", index: str = "") -> str:
     """Markup of a name with its dots, accent, subscript and index."""
     base = GREEK.get(name.base, name.base)
-    core = f"<mi{_variant_attribute(name, base)}>{escape(base)}</mi>"
-    for mark in _accent_marks(name.dots, accent):
+    variant = ' mathvariant="normal"' if name.upright and len(base) == 1 else ""
+    core = f"<mi{variant}>{escape(base)}</mi>"
+    for mark in ("", "˙", "¨")[min(name.dots, 2)] + ("~" if accent == "tilde" else ""):
         core = f'<mover accent="true">{core}<mo stretchy="false">{mark}</mo></mover>'
     parts = [f"<mtext>{escape(name.subscript)}</mtext>"] if name.subscript else []
     parts += [f"<mtext>{escape(index)}</mtext>"] if index else []
@@ -163,22 +161,14 @@ def name_markup(name: SymbolName, accent: str = "", index: str = "") -> str:
     return f"<msub>{core}{below}</msub>" if below else core
 
 
-def _variant_attribute(name: SymbolName, base: str) -> str:
-    return ' mathvariant="normal"' if name.upright and len(base) == 1 else ""
-
-
-def _accent_marks(dots: int, accent: str) -> list[str]:
-    marks = {0: [], 1: ["˙"], 2: ["¨"]}[min(dots, 2)]
-    return [*marks, "~"] if accent == "tilde" else marks
-
-
 def _node_markup(node: Node) -> str:
     if isinstance(node, Name):
         return name_markup(node.name, node.accent, node.index)
     if isinstance(node, Word):
         number = re.fullmatch(r"−?[0-9.]+", node.text) is not None
         tag = "mn" if number else "mi" if len(node.text) == 1 else "mtext"
-        return f"<{tag}>{_escape_blanks(node.text)}</{tag}>"
+        shown = escape(node.text).replace(" ", "&#160;")  # MathML would drop outer blanks
+        return f"<{tag}>{shown}</{tag}>"
     if isinstance(node, Sign):
         return _sign_markup(node)
     if isinstance(node, Row):
@@ -196,11 +186,6 @@ def _node_markup(node: Node) -> str:
     if isinstance(node, Root):
         return f"<msqrt>{_node_markup(node.body)}</msqrt>"
     return _table_markup(node)
-
-
-def _escape_blanks(text: str) -> str:
-    """Escaped text that keeps outer blanks, which MathML would drop."""
-    return escape(text).replace(" ", "&#160;")
 
 
 def _sign_markup(sign: Sign) -> str:

@@ -58,23 +58,14 @@ def text_box(node: Node) -> Box:
     if isinstance(node, Word):
         return Box((node.text,))
     if isinstance(node, Sign):
-        return Box(
-            (
-                f" {node.text} "
-                if node.has_spaces and node.text != ","
-                else _compact_sign(node.text),
-            )
-        )
+        if node.text == ",":
+            return Box((", ",))
+        return Box((f" {node.text} " if node.has_spaces else node.text,))
     if isinstance(node, Row):
         return _join_boxes([text_box(item) for item in node.items])
     if isinstance(node, Fraction):
-        return _join_boxes(
-            [
-                _group_quotient_part(node.numerator),
-                Box((" / ",)),
-                _group_quotient_part(node.denominator),
-            ]
-        )
+        above, below = map(_group_quotient_part, (node.numerator, node.denominator))
+        return _join_boxes([above, Box((" / ",)), below])
     if isinstance(node, Superscript):
         return _join_boxes([text_box(node.base), Box((_exponent_text(node.exponent),))])
     if isinstance(node, Fence):
@@ -94,10 +85,6 @@ def _index_text(index: str) -> str:
     if not index:
         return ""
     return f".{index}" if index in ("x", "y", "z") else f"[{index}]"
-
-
-def _compact_sign(text: str) -> str:
-    return ", " if text == "," else text
 
 
 def _group_quotient_part(node: Node) -> Box:

@@ -226,19 +226,12 @@ _ROW_LOOPS = {
 }
 
 
-def _do_text(step: RunPass) -> str:
-    assert step.whole is not None
-    return f"pass {_spaced_name(step.whole.name)}"
-
-
-def _add_text(step: Add) -> str:
-    times = "" if abs(step.times) == 1 else f"{abs(step.times)} "
-    return f"{step.to} {'-' if step.times < 0 else '+'}= {times}{step.source}"
-
-
 _STEP_TEXTS: dict[type, Callable[..., str]] = {
-    RunPass: _do_text,
-    Add: _add_text,
+    RunPass: lambda s: f"pass {_spaced_name(s.whole.name)}",
+    Add: lambda s: (
+        f"{s.to} {'-' if s.times < 0 else '+'}= "
+        f"{'' if abs(s.times) == 1 else f'{abs(s.times)} '}{s.source}"
+    ),
     Copy: lambda s: f"{s.to} = {s.source or '0'}",
     SelectColumns: lambda s: (
         f"{s.to} = {'columns' if s.rows else 'rows and columns'} of {s.source} that belong to free "

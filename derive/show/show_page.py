@@ -36,20 +36,14 @@ from .symbol_names import unit_text
 #: Labels of source paragraphs, by their kind.
 _SOURCE_LABELS = {"sources": "Source: ", "sweep": "Source of the sweep: "}
 
-__all__ = ["FORMATS", "STAGES", "STYLE", "ElementView", "html_body", "show", "show_view"]
-
-
-def show(element: str, at: str, format: str, registry: Callable[[str], ElementView]) -> str:
-    """Page of an element.
-
-    `registry` gives the view of a name (and raises ElementError for an unknown one).  Raises
-    ElementError for an unknown stage or format.
-    """
-    return show_view(registry(element), at, format)
+__all__ = ["FORMATS", "STAGES", "STYLE", "ElementView", "html_body", "show_view"]
 
 
 def show_view(view: ElementView, at: str = "equations", format: str = "text") -> str:
-    """Page of a view: complete HTML, a LaTeX fragment (amsmath), or text of 100 columns."""
+    """Page of a view: complete HTML, a LaTeX fragment (amsmath), or text of 100 columns.
+
+    Raises ElementError for an unknown stage or format.
+    """
     return render_page(view.title, lambda measure: document(view, at, measure), format)
 
 
@@ -64,9 +58,7 @@ def render_page(title: str, items: Callable[[TextWidth], list[Item]], format: st
 
 
 def _text_page(_: str, items: list[Item]) -> str:
-    lines: list[str] = []
-    for item in items:
-        lines += _text_item(item)
+    lines = [line for item in items for line in _text_item(item)]
     return re.sub(r"\n{3,}", "\n\n", "\n".join(lines)).strip("\n") + "\n"
 
 
@@ -197,22 +189,17 @@ def _latex_caption(text: str) -> str:
 
 
 def _latex_row(row: QuantityRow) -> str:
-    indent = r"\quad " if row.inner else ""
+    symbol = f"${latex_text(row.symbol)}$"
+    if isinstance(row.symbol, Name) and row.symbol.name.upright and not row.symbol.index:
+        symbol = _breakable_name(row.symbol.name.code_name())
     cells = (
-        indent + _symbol_cell(row.symbol),
+        (r"\quad " if row.inner else "") + symbol,
         rf"\texttt{{{_breakable_name(row.port)}}}",
         "$" + row.shape.replace("×", r"\times") + "$",
         latex_unit(row.unit),
         _latex_caption(row.meaning),
     )
     return " & ".join(rf"\raggedright {cell}" for cell in cells) + r"\tabularnewline"
-
-
-def _symbol_cell(symbol: Node) -> str:
-    """A name in a table, where long words may be broken."""
-    if isinstance(symbol, Name) and symbol.name.upright and not symbol.index:
-        return _breakable_name(symbol.name.code_name())
-    return f"${latex_text(symbol)}$"
 
 
 def _breakable_name(word: str) -> str:

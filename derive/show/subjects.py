@@ -12,7 +12,6 @@ from dataclasses import replace
 from functools import cache, partial
 
 from mstmm.errors import ElementError
-from mstmm.ir import KernelIR
 from mstmm.ir.element_spec import ElementSpec
 
 from ..catalogue.element_specs import generic_spec, shared_specs, spec_of
@@ -142,13 +141,11 @@ def _make_view(
     names: DeclaredNames | None = None,
     before: tuple[Derivation, ...] = (),
 ) -> ElementView:
-    def lowered_kernels() -> tuple[KernelIR, ...]:
-        return tuple(kernel.ir() for kernel in kernels)
-
     derivations = (*before, *(k.derivation for k in kernels))
     return ElementView(
-        name, title, derivations, lowered_kernels, c_text, sources, names or DeclaredNames()
-    )
+        name, title, derivations, lambda: [kernel.ir() for kernel in kernels], c_text, sources,
+        names or DeclaredNames(),
+    )  # fmt: skip
 
 
 # --- a hinge's classical transfer matrix and its motion subspace ----------------------------------

@@ -249,7 +249,7 @@ class NamedEntries:
         arrays = {
             str(s.name): s
             for s in (*input_symbols, *defined_symbols, *output_symbols)
-            if _has_fixed_length(s)
+            if s.shape[1] == 1 and s.shape[0].is_Integer and s.shape[0] > 0  # fixed length
         }
         self._parts = {
             name: self._unambiguous_parts(name, int(s.rows)) for name, s in arrays.items()
@@ -273,12 +273,6 @@ class NamedEntries:
             self._used_names.add(name)
             parts.append(replace(part, name=name))
         return tuple(parts)
-
-
-def _has_fixed_length(symbol: sp.MatrixSymbol) -> bool:
-    """Whether a symbol is a column of fixed length."""
-    rows, columns = symbol.shape
-    return bool(columns == 1 and rows.is_Integer and rows > 0)
 
 
 def _symmetric_entries(derivation: Derivation) -> dict[sp.Basic, sp.Basic]:

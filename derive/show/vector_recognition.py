@@ -150,14 +150,9 @@ def _coefficient(matrix: Matrix, candidate: sp.MatrixExpr) -> sp.Expr:
             if symbols == 1:
                 constant = [t for t in sp.Add.make_args(matrix[position]) if not _has_owner(t)]
                 return sp.Add(*constant) / number
-            multiples = [t for t in sp.Add.make_args(matrix[position]) if _is_multiple(symbols, t)]
-            return sp.Add(*(t / symbols for t in multiples)) / number
+            factors = [t / symbols for t in sp.Add.make_args(matrix[position])]
+            return sp.Add(*(factor for factor in factors if not _has_owner(factor))) / number
     return sp.Integer(0)
-
-
-def _is_multiple(symbols: sp.Expr, term: sp.Expr) -> bool:
-    """Whether the term is `symbols` times scalars."""
-    return not _has_owner(term / symbols)
 
 
 def _has_owner(term: sp.Expr) -> bool:
@@ -174,18 +169,13 @@ def _column_candidates(term: tuple[sp.Basic, ...]) -> Iterator[sp.MatrixExpr]:
     elif len(vectors) == 1 and len(matrices) == 1:
         yield matrices[0] * vectors[0]
         yield matrices[0].T * vectors[0]
-    elif len(vectors) == 3:
-        yield from (Tilde(a) * Tilde(a) * b for a, b in _repeated_and_single(vectors))
+    elif len(vectors) == 3:  # one of them occurs twice
+        for a in set(vectors):
+            others = [v for v in vectors if v != a]
+            if len(others) == 1:
+                yield Tilde(a) * Tilde(a) * others[0]
     elif len(matrices) == 1 and len(vectors) == 2 and vectors[0] == vectors[1]:
         yield Tilde(vectors[0]) * matrices[0] * vectors[0]
-
-
-def _repeated_and_single(vectors: list[sp.Basic]) -> Iterator[tuple[sp.Basic, sp.Basic]]:
-    """Vector that occurs twice among three, and the other one."""
-    for a in set(vectors):
-        remaining = [v for v in vectors if v != a]
-        if len(remaining) == 1:
-            yield a, remaining[0]
 
 
 def _square_candidates(term: tuple[sp.Basic, ...]) -> Iterator[sp.MatrixExpr]:
@@ -210,15 +200,6 @@ def _planar_column_candidates(term: tuple[sp.Basic, ...]) -> Iterator[sp.MatrixE
         yield Perp(term[0])
 
 
-def _planar_row_candidates(term: tuple[sp.Basic, ...]) -> Iterator[sp.MatrixExpr]:
-    yield from (candidate.T for candidate in _planar_column_candidates(term))
-
-
-def _planar_square_candidates(term: tuple[sp.Basic, ...]) -> Iterator[sp.MatrixExpr]:
-    if not term:
-        yield sp.Identity(2)
-
-
 def _split_vectors_matrices(term: tuple[sp.Basic, ...]) -> tuple[list[sp.Basic], list[sp.Basic]]:
     vectors = [x for x in term if tuple(x.shape) == (3, 1)]
     matrices = [x for x in term if tuple(x.shape) == (3, 3)]
@@ -233,6 +214,6 @@ _CANDIDATES: dict[
     (3, 3): _square_candidates,
     (1, 3): lambda term: (candidate.T for candidate in _column_candidates(term)),
     (2, 1): _planar_column_candidates,
-    (1, 2): _planar_row_candidates,
-    (2, 2): _planar_square_candidates,
+    (1, 2): lambda term: (candidate.T for candidate in _planar_column_candidates(term)),
+    (2, 2): lambda term: iter(() if term else (sp.Identity(2),)),
 }  # fmt: skip

@@ -56,27 +56,13 @@ def measure_case(case: CaseDefinition, points: int, tolerance: float) -> Measure
     except NumericalFailure as error:
         raise NumericalFailure(f'case "{case.name}": {error}') from None
     return MeasuredCase(
-        case.name,
-        case.title,
-        case.cause,
-        case.parameter,
-        case.unit,
-        case.scale.name,
-        case.measured,
-        case.limit,
-        case.method.name,
-        "above" if holds_at_low else "below",
-        bracket.fails_at,
-        bracket.holds_at,
-        bracket.monotone,
-        method.points(),
-        case.remedy.name,
-        remedy_bracket.holds_at,
-        remedy_bracket.fails_at,
-        remedy_bracket.monotone,
-        remedy.points(),
-        case.source,
-    )
+        case.name, case.title, case.cause, case.parameter, case.unit, case.scale.name,
+        case.measured, case.limit,
+        case.method.name, "above" if holds_at_low else "below", bracket.fails_at,
+        bracket.holds_at, bracket.monotone, method.points(),
+        case.remedy.name, remedy_bracket.holds_at, remedy_bracket.fails_at,
+        remedy_bracket.monotone, remedy.points(), case.source,
+    )  # fmt: skip
 
 
 # --- atlas of cases -------------------------------------------------------------------------------

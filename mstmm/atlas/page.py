@@ -21,29 +21,21 @@ means that the remedy holds over the whole measured range.
 """
 
 _HEADINGS = ("case", "parameter", "measured", "limit", "fails", "remedy", "holds to")
-_ROW = (
-    "| [{name}](#{name}) | {parameter} | {measured} | {limit} | {frontier} | {remedy} | {reach} |"
-)
 
 
 def markdown_page(cases: Sequence[CaseResult], pictures: bool) -> str:
     """Whole page; with `pictures` it refers to NAME.png for each case, in the same folder."""
-    rows = "\n".join(_ROW.format(**_table_row(case)) for case in cases)
+    rows = "\n".join(f"| {' | '.join(_table_row(case))} |" for case in cases)
     head = f"| {' | '.join(_HEADINGS)} |\n|{'---|' * len(_HEADINGS)}"
     case_sections = "\n".join(_section(case, pictures) for case in cases)
     return f"{INTRODUCTION}\n{head}\n{rows}\n\n{case_sections}"
 
 
-def _table_row(case: CaseResult) -> dict[str, str]:
-    return {
-        "name": case.name,
-        "parameter": parameter_with_unit(case),
-        "measured": case.measured,
-        "limit": limit_text(case),
-        "frontier": frontier_text(case),
-        "remedy": case.remedy,
-        "reach": remedy_range(case),
-    }
+def _table_row(case: CaseResult) -> tuple[str, ...]:
+    return (
+        f"[{case.name}](#{case.name})", parameter_with_unit(case), case.measured, limit_text(case),
+        frontier_text(case), case.remedy, remedy_range(case),
+    )  # fmt: skip
 
 
 def format_number(value: float, digits: int = 3) -> str:
@@ -214,13 +206,9 @@ def _label_end(axis: Any, case: CaseResult) -> None:
         f"tried to {format_number(parameter)}",
         (parameter, _TEXT_POSITION if is_off_scale else max(measured, _MIN_DRAWN)),
         xycoords=("data", "axes fraction" if is_off_scale else "data"),
-        xytext=(0, -7 if is_falling else 2 if is_off_scale else 7),
-        textcoords="offset points",
-        fontsize=8,
-        color=_FAILURE_COLOUR,
-        ha="center",
-        va="top" if is_falling else "bottom",
-    )
+        xytext=(0, -7 if is_falling else 2 if is_off_scale else 7), textcoords="offset points",
+        fontsize=8, color=_FAILURE_COLOUR, ha="center", va="top" if is_falling else "bottom",
+    )  # fmt: skip
 
 
 def _is_off_scale(measured: float) -> bool:
@@ -234,11 +222,6 @@ def _draw_curve(axis: Any, points: Points, **style: Any) -> None:
     axis.plot(*zip(*shown, strict=True), linewidth=1.6, markersize=3.5, **style)
     off_scale = [parameter for parameter, m in points if _is_off_scale(m)]
     axis.plot(
-        off_scale,
-        [_ARROW_POSITION] * len(off_scale),
-        transform=axis.get_xaxis_transform(),
-        color=style["color"],
-        marker=10,
-        linestyle="none",
-        markersize=5,
-    )
+        off_scale, [_ARROW_POSITION] * len(off_scale), transform=axis.get_xaxis_transform(),
+        color=style["color"], marker=10, linestyle="none", markersize=5,
+    )  # fmt: skip

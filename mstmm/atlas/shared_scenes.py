@@ -53,15 +53,52 @@ def chain(count: int, kind: str = "pin", skew: float = 0.0, **of_rods: Any) -> d
     }  # fmt: skip
 
 
+def row_hinges(names: Sequence[str], kind: str) -> list[dict[str, Any]]:
+    """Hinges of one kind from the ground along bodies, each at the tip of the one before."""
+    inboard = ["ground", *(f"{name}.tip" for name in names)]
+    return [
+        {"name": f"hinge{i}", "type": kind, "inboard": inboard[i], "outboard": name}
+        for i, name in enumerate(names)
+    ]
+
+
 def rod_chain(masses: Sequence[float]) -> dict[str, Any]:
     """Chain of rods of 1 m with these masses on parallel pins; gravity along -y."""
-    hinges = [
-        {"name": f"pin{i}", "type": "pin", "outboard": f"rod{i}",
-         "inboard": f"rod{i - 1}.tip" if i else "ground"}
-        for i in range(len(masses))
-    ]  # fmt: skip
     bodies = [rod(f"rod{i}", mass=mass) for i, mass in enumerate(masses)]
+    hinges = row_hinges([body["name"] for body in bodies], "pin")
     return {"gravity": [0, -9.81, 0], "body": bodies, "hinge": hinges}
+
+
+def pinned_rod(weight: float = 0.0, **of_pin: Any) -> Model:
+    """Rod on a pin with these keys; gravity `weight` along x."""
+    pin = {"name": "pin", "type": "pin", "inboard": "ground", "outboard": "rod"} | of_pin
+    return compile_looped({"gravity": [weight, 0, 0], "body": [rod("rod")], "hinge": [pin]})
+
+
+def sliding_mass(axis: Sequence[float] = (1, 0, 0), **law: Any) -> Model:
+    """Body of 1 kg on a slide with this law, without weight."""
+    slide = {
+        "name": "slide", "type": "prismatic", "axis": list(axis), "inboard": "ground",
+        "outboard": "mass", "law": law,
+    }  # fmt: skip
+    mass = {"name": "mass", "mass": 1.0}
+    return compile_looped({"gravity": [0, 0, 0], "body": [mass], "hinge": [slide]})
+
+
+def uniform_beam(stiffness: float, shapes: int, name: str = "beam", **keys: Any) -> dict[str, Any]:
+    """Beam of 1 m and 1 kg with this bending stiffness (N m2) and number of shapes along y."""
+    return {
+        "name": name, "length": 1.0, "mass_per_length": 1.0, "bending_stiffness": stiffness,
+        "modes": {"y": shapes},
+    } | keys  # fmt: skip
+
+
+def beam_on_ground(
+    beam: dict[str, Any], hinge: dict[str, Any], weight: float = 0.0, **scene: Any
+) -> Model:
+    """Beam on the ground by a hinge of these keys; gravity `weight` along -y."""
+    foot = {"name": "foot", "inboard": "ground", "outboard": beam["name"]} | hinge
+    return compile_looped({"gravity": [0, -weight, 0], "beam": [beam], "hinge": [foot], **scene})
 
 
 def random_pin_states(count: int) -> list[tuple[Array, Array]]:
@@ -72,11 +109,8 @@ def random_pin_states(count: int) -> list[tuple[Array, Array]]:
 
 def rod_with_spring(stiffness: float, damping: float = 0.0) -> Model:
     """Rod on a pin with spring and damper (N*m/rad, N*m*s/rad), from 1e-3 rad; no weight."""
-    hinge = {
-        "name": "pin", "type": "pin", "inboard": "ground", "outboard": "rod",
-        "law": {"stiffness": stiffness, "damping": damping}, "initial": {"q": [RELEASE_ANGLE]},
-    }  # fmt: skip
-    return compile_looped({"gravity": [0, 0, 0], "body": [rod("rod")], "hinge": [hinge]})
+    law = {"stiffness": stiffness, "damping": damping}
+    return pinned_rod(law=law, initial={"q": [RELEASE_ANGLE]})
 
 
 def hanging_rod(rate: float) -> Model:
@@ -84,16 +118,9 @@ def hanging_rod(rate: float) -> Model:
 
     Its weight is chosen accordingly.
     """
-
-    def rod_with_weight(weight: float) -> Model:
-        pin = {
-            "name": "pin", "type": "pin", "inboard": "ground", "outboard": "rod",
-            "initial": {"q": [RELEASE_ANGLE]},
-        }  # fmt: skip
-        return compile_looped({"gravity": [weight, 0, 0], "body": [rod("rod")], "hinge": [pin]})
-
-    stiffness_ratio = float(rod_with_weight(1.0).derivatives(np.zeros(1), np.zeros(1)).q[0, 0])
-    return rod_with_weight(rate**2 / -stiffness_ratio)
+    initial = {"q": [RELEASE_ANGLE]}
+    unit = pinned_rod(1.0, initial=initial).derivatives(np.zeros(1), np.zeros(1)).q
+    return pinned_rod(rate**2 / -float(unit[0, 0]), initial=initial)
 
 
 def stiffness_for_frequency(rate: float) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 from ...array_validation import Array
 from ..case_definition import COUNT_SCALE, LOG_SCALE, CaseDefinition, MethodDefinition
 from ..error_measures import simulate_to_end
-from ..shared_scenes import compile_looped
+from ..shared_scenes import beam_on_ground, compile_looped, row_hinges, uniform_beam
 
 # --- linear-beam ----------------------------------------------------------------------------------
 
@@ -27,12 +27,9 @@ def _deflection(spin: float, stiffening: bool, shapes: int) -> float:
         "name": "blade", "length": 10.0, "mass_per_length": 1.2, "bending_stiffness": 1.4e4,
         "modes": {"y": shapes}, "stiffening": stiffening,
     }  # fmt: skip
-    hub = {
-        "name": "hub", "type": "pin", "inboard": "ground", "outboard": "blade",
-        "drive": f"where(t < {SPIN_UP_TIME}, {ramp}, {spin!r}*(t - {SPIN_UP_TIME / 2}))",
-    }  # fmt: skip
+    drive = f"where(t < {SPIN_UP_TIME}, {ramp}, {spin!r}*(t - {SPIN_UP_TIME / 2}))"
     times = np.linspace(0.0, SPIN_T_END, 301)
-    model = compile_looped({"gravity": [0, 0, 0], "beam": [blade], "hinge": [hub]})
+    model = beam_on_ground(blade, {"type": "pin", "drive": drive})
     run = simulate_to_end(model, SPIN_T_END, "rodas4p2", rtol=1e-6, atol=1e-8, output_times=times)
     return float(np.abs(run.deflection("blade", "tip")[:, 1]).max())
 
@@ -125,17 +122,13 @@ SHAPES = 4
 
 def _lost_inertia(deflection: float, quadrature: bool) -> float:
     """Largest relative loss of inertia over all motions; above 1 the inertia is negative."""
-    beam = {
-        "name": "rod", "length": 1.0, "mass_per_length": 1.0, "bending_stiffness": 50.0,
-        "modes": {"y": SHAPES}, "frame": "tangent", "stiffening": True, "quadrature": quadrature,
-    }  # fmt: skip
-    pin = {"name": "pin", "type": "pin", "inboard": "ground", "outboard": "rod"}
-    beam_model = compile_looped({"gravity": [0, 0, 0], "beam": [beam], "hinge": [pin]})
+    beam = uniform_beam(50.0, SHAPES, frame="tangent", stiffening=True, quadrature=quadrature)
+    beam_model = beam_on_ground(beam, {"type": "pin"})
     straight, zeros = beam_model.initial_state()
     bent = straight.copy()
     bent[1] = 1e-3
     run = simulate_to_end(beam_model, 1e-6, initial=(bent, zeros), output_times=[0.0, 1e-6])
-    bent[1] *= deflection / float(run.deflection("rod", "tip")[0, 1])
+    bent[1] *= deflection / float(run.deflection("beam", "tip")[0, 1])
     inverse = np.linalg.inv(np.linalg.cholesky(beam_model.mass_matrix(straight)))
     eigenvalues = np.linalg.eigvalsh(inverse @ beam_model.mass_matrix(bent) @ inverse.T)
     return 1 - float(eigenvalues.min())
@@ -168,19 +161,11 @@ STIFFENED_MASS = CaseDefinition(
 @cache
 def _tip_position(load: float, pieces: int, shapes: int) -> Array:
     """Static tip position of a clamped beam of 1 m and 1 N m2 under a transverse tip load (N)."""
-    beam = {
-        "length": 1 / pieces, "mass_per_length": 1.0, "bending_stiffness": 1.0,
-        "modes": {"y": shapes},
-    }  # fmt: skip
     names = [f"piece{i}" for i in range(pieces)]
-    welds = [
-        {"name": f"weld{i}", "type": "fixed", "outboard": name,
-         "inboard": f"{names[i - 1]}.tip" if i else "ground"}
-        for i, name in enumerate(names)
-    ]  # fmt: skip
     end = f"{names[-1]}.tip"
     beam_model = compile_looped({
-        "gravity": [0, 0, 0], "beam": [beam | {"name": name} for name in names], "hinge": welds,
+        "gravity": [0, 0, 0], "hinge": row_hinges(names, "fixed"),
+        "beam": [uniform_beam(1.0, shapes, name, length=1 / pieces) for name in names],
         "load": [{"on": end, "force": [0, load, 0]}],
     })  # fmt: skip
     rest = beam_model.equilibrium(), np.zeros(beam_model.nu)
@@ -218,15 +203,8 @@ STEP, STEPS = 1e-3, 200
 
 def _largest_angle(shapes: float, frame: str) -> float:
     """Largest angle (rad) of the end of a beam of 1 m and 1 kg on a damped pin, from 1 rad/s."""
-    beam = {
-        "name": "beam", "length": 1.0, "mass_per_length": 1.0, "bending_stiffness": 1.0,
-        "modes": {"y": int(shapes)}, "frame": frame,
-    }  # fmt: skip
-    pin = {
-        "name": "pin", "type": "pin", "inboard": "ground", "outboard": "beam",
-        "law": {"damping": 1.0}, "initial": {"u": [1.0]},
-    }  # fmt: skip
-    beam_model = compile_looped({"gravity": [0, 0, 0], "beam": [beam], "hinge": [pin]})
+    pin = {"type": "pin", "law": {"damping": 1.0}, "initial": {"u": [1.0]}}
+    beam_model = beam_on_ground(uniform_beam(1.0, int(shapes), frame=frame), pin)
     times = np.arange(STEPS + 1) * STEP
     run = simulate_to_end(beam_model, times[-1], "rk4", STEP, output_times=times)
     return float(np.abs(run.q[:, 0]).max())

@@ -16,7 +16,7 @@ from ...runtime.flexible.beam.gauss_quadrature import gauss_points
 from ...runtime.flexible.beam.shape_functions import Eigenfunction, wave_number
 from ..case_definition import COUNT_SCALE, LOG_SCALE, CaseDefinition, MethodDefinition
 from ..error_measures import bending_error, root_inertia, simulate_to_end
-from ..shared_scenes import compile_looped
+from ..shared_scenes import beam_on_ground, uniform_beam
 
 # --- end-moment -----------------------------------------------------------------------------------
 
@@ -26,15 +26,9 @@ MOMENT = 0.05
 @cache
 def _tip_deflection(basis: str, shapes: int) -> float:
     """Static tip deflection (m) of a clamped beam of 1 m and 1 N m2 under a moment at its tip."""
-    beam = {
-        "name": "beam", "length": 1.0, "mass_per_length": 1.0, "bending_stiffness": 1.0,
-        "modes": {"y": shapes}, "basis": basis, "frame": "tangent", "stiffening": False,
-    }  # fmt: skip
-    wall = {"name": "wall", "type": "fixed", "inboard": "ground", "outboard": "beam"}
+    beam = uniform_beam(1.0, shapes, basis=basis, frame="tangent", stiffening=False)
     load = {"on": "beam.tip", "moment": [0, 0, MOMENT]}
-    beam_model = compile_looped(
-        {"gravity": [0, 0, 0], "beam": [beam], "hinge": [wall], "load": [load]}
-    )
+    beam_model = beam_on_ground(beam, {"type": "fixed"}, load=[load])
     rest = beam_model.equilibrium(), np.zeros(beam_model.nu)
     run = simulate_to_end(beam_model, 1e-9, initial=rest, output_times=[0.0, 1e-9])
     return float(run.deflection("beam", "tip")[0, 1])

@@ -15,7 +15,14 @@ from ...derive.classical.harmonic_beam import BETA, LENGTH, field_matrix
 from ...runtime.flexible.beam.shape_functions import wave_number
 from ..case_definition import COUNT_SCALE, LINEAR_SCALE, LOG_SCALE, CaseDefinition, MethodDefinition
 from ..error_measures import refinement_correction, simulate_to_end
-from ..shared_scenes import chain, compile_looped, random_pin_states, rod_chain
+from ..shared_scenes import (
+    chain,
+    compile_looped,
+    random_pin_states,
+    rod_chain,
+    row_hinges,
+    uniform_beam,
+)
 
 
 def _product_case(
@@ -142,16 +149,9 @@ STEP, STEPS = 1e-3, 20
 
 
 def _beam_error(count: float, method: str) -> float:
-    beam = {
-        "length": 1.0, "mass_per_length": 1.0, "bending_stiffness": 50.0, "modes": {"y": 3},
-        "frame": "tangent", "stiffening": False,
-    }  # fmt: skip
-    beams = [beam | {"name": f"beam{i}"} for i in range(int(count))]
-    welds = [
-        {"name": f"weld{i}", "type": "fixed", "outboard": f"beam{i}",
-         "inboard": f"beam{i - 1}.tip" if i else "ground"}
-        for i in range(int(count))
-    ]  # fmt: skip
+    names = [f"beam{i}" for i in range(int(count))]
+    beams = [uniform_beam(50.0, 3, name, frame="tangent", stiffening=False) for name in names]
+    welds = row_hinges(names, "fixed")
     model = compile_looped({"gravity": [0, -9.81, 0], "beam": beams, "hinge": welds})
     expected = simulate_to_end(model, STEPS * STEP, "dttmm", STEP).q[-1]
     computed = simulate_to_end(model, STEPS * STEP, method, STEP).q[-1]
@@ -230,17 +230,10 @@ def _error_by_signs(number: float) -> float:
 def _error_by_pivots(number: float) -> float:
     count = int(number)
     parts = max(ELEMENT_COUNT, count // 2)
-    beams = [
-        {"name": f"part{k}", "length": 1 / parts, "mass_per_length": 1.0,
-         "bending_stiffness": 1.0, "modes": {"y": SHAPE_COUNT}}
-        for k in range(parts)
-    ]  # fmt: skip
-    hinges = [
-        {"name": f"weld{k}", "type": "fixed", "outboard": f"part{k}",
-         "inboard": f"part{k - 1}.tip" if k else "ground"}
-        for k in range(parts)
-    ]  # fmt: skip
-    modes = compile_looped({"gravity": [0, 0, 0], "beam": beams, "hinge": hinges}).modes(count)
+    names = [f"part{k}" for k in range(parts)]
+    beams = [uniform_beam(1.0, SHAPE_COUNT, name, length=1 / parts) for name in names]
+    welds = row_hinges(names, "fixed")
+    modes = compile_looped({"gravity": [0, 0, 0], "beam": beams, "hinge": welds}).modes(count)
     if not modes.is_complete:
         return 1.0
     return abs(float(np.sqrt(modes.omega[-1])) / wave_number("clamped-free", count) - 1)

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..case_definition import COUNT_SCALE, LOG_SCALE, CaseDefinition, MethodDefinition
 from ..error_measures import relative_growth, simulate_to_end
-from ..shared_scenes import compile_looped, rod, rod_with_spring
+from ..shared_scenes import beam_on_ground, pinned_rod, rod_with_spring, sliding_mass, uniform_beam
 
 # --- rk4-stiffness --------------------------------------------------------------------------------
 
@@ -66,12 +66,8 @@ SHAPE_T_END = 0.2
 
 def _deflection(shapes: float, method: str) -> float:
     """Largest tip deflection (m) of a clamped beam of 1 m under its weight, from straight."""
-    beam = {
-        "name": "beam", "length": 1.0, "mass_per_length": 1.0, "bending_stiffness": 50.0,
-        "modes": {"y": int(shapes)}, "stiffening": False,
-    }  # fmt: skip
-    wall = {"name": "wall", "type": "fixed", "inboard": "ground", "outboard": "beam"}
-    beam_model = compile_looped({"gravity": [0, -9.81, 0], "beam": [beam], "hinge": [wall]})
+    beam = uniform_beam(50.0, int(shapes), stiffening=False)
+    beam_model = beam_on_ground(beam, {"type": "fixed"}, 9.81)
     run = simulate_to_end(beam_model, SHAPE_T_END, method, STEP)
     return float(np.abs(run.deflection("beam", "tip")[:, 1]).max())
 
@@ -104,11 +100,7 @@ def _pulse_error(width: float, switched: bool) -> float:
     if switched:
         low, high = PULSE_ANGLE - 6 * width, PULSE_ANGLE + 6 * width
         effort = f"where(q > {low!r}, where(q < {high!r}, {effort}, 0), 0)"
-    hinge = {
-        "name": "pin", "type": "pin", "inboard": "ground", "outboard": "rod",
-        "law": {"effort": effort}, "initial": {"u": [1.0]},
-    }  # fmt: skip
-    rod_model = compile_looped({"gravity": [0, 0, 0], "body": [rod("rod")], "hinge": [hinge]})
+    rod_model = pinned_rod(law={"effort": effort}, initial={"u": [1.0]})
     run = simulate_to_end(rod_model, 10.0, output_times=[10.0])
     inertia = float(rod_model.mass_matrix([0.0])[0, 0])
     return abs(float(run.u[-1, 0]) / math.sqrt(1 + 2 * PULSE_WORK / inertia) - 1)
@@ -141,12 +133,7 @@ def _rebound(rate: float, fixed_step: bool) -> float:
     It is the largest over PHASE_COUNT instants within a step at which the contact starts.
     """
     stop = {"lower": 0.0, "stiffness": (rate / STOP_STEP) ** 2, "damping": 0.0}
-    slide = {
-        "name": "slide", "type": "prismatic", "axis": [1, 0, 0], "inboard": "ground",
-        "outboard": "mass", "law": {"limits": stop},
-    }  # fmt: skip
-    mass = {"name": "mass", "mass": 1.0}
-    mass_model = compile_looped({"gravity": [0, 0, 0], "body": [mass], "hinge": [slide]})
+    mass_model = sliding_mass(limits=stop)
     t_end = STOP_STEP * round((np.pi / rate) + 8)
     speeds = []
     for phase in np.arange(PHASE_COUNT) / PHASE_COUNT:

@@ -8,9 +8,10 @@ import numpy as np
 
 from ...array_validation import Array
 from ...runtime.integrate.methods import ClassicalDiscreteTime, Method
+from ...runtime.model.model import Model
 from ..case_definition import LOG_SCALE, CaseDefinition, MethodDefinition
 from ..error_measures import energy_gain, relative_amplitudes, simulate_to_end
-from ..shared_scenes import FALL_ENERGY, compile_looped, double_pendulum, rod
+from ..shared_scenes import FALL_ENERGY, compile_looped, double_pendulum, pinned_rod, sliding_mass
 
 #: Step (s) of all cases but the last.
 STEP = 0.01
@@ -167,19 +168,15 @@ INITIAL_ANGLE = 1e-9
 TIME_CONSTANTS = 8.0
 
 
-def _inverted_rod(weight: float) -> dict[str, object]:
-    pin = {
-        "name": "pin", "type": "pin", "inboard": "ground", "outboard": "rod",
-        "initial": {"q": [INITIAL_ANGLE]},
-    }  # fmt: skip
-    return {"gravity": [-weight, 0, 0], "body": [rod("rod")], "hinge": [pin]}
+def _inverted_rod(weight: float) -> Model:
+    return pinned_rod(-weight, initial={"q": [INITIAL_ANGLE]})
 
 
 def _growth_error(rate: float, fixed_step: bool) -> float:
     """Relative error; `rate` is the step times the growth rate of an inverted rod on its pin."""
-    unit_model = compile_looped(_inverted_rod(1.0))
+    unit_model = _inverted_rod(1.0)
     slope = float(unit_model.derivatives(np.zeros(1), np.zeros(1)).q[0, 0])
-    falling = compile_looped(_inverted_rod((rate / STEP) ** 2 / slope))
+    falling = _inverted_rod((rate / STEP) ** 2 / slope)
     t_end = max(1, round(TIME_CONSTANTS / rate)) * STEP
     exact = simulate_to_end(falling, t_end, rtol=1e-11, atol=1e-22, output_times=[t_end]).q
     if fixed_step:
@@ -215,16 +212,8 @@ FRICTION_TIMES = np.linspace(0.0, FRICTION_T_END, 31)
 
 def _friction_path(velocity: float, method: str, step: float) -> Array:
     """Path (m) of 1 kg with friction of 1 N, pulled by 10 N/m whose end moves at 0.3 m/s."""
-    law = {
-        "effort": "10*(0.3*t - q)",
-        "friction": {"coulomb": 1.0, "regularisation_velocity": velocity},
-    }
-    slide = {
-        "name": "slide", "type": "prismatic", "axis": [1, 0, 0], "inboard": "ground",
-        "outboard": "mass", "law": law,
-    }  # fmt: skip
-    mass = {"name": "mass", "mass": 1.0}
-    mass_model = compile_looped({"gravity": [0, 0, 0], "body": [mass], "hinge": [slide]})
+    friction = {"coulomb": 1.0, "regularisation_velocity": velocity}
+    mass_model = sliding_mass(effort="10*(0.3*t - q)", friction=friction)
     run = simulate_to_end(mass_model, FRICTION_T_END, method, step, output_times=FRICTION_TIMES)
     return np.asarray(run.q[:, 0])
 

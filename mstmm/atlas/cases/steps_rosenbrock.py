@@ -17,10 +17,10 @@ from ..error_measures import STEP as VIBRATION_STEP
 from ..error_measures import relative_amplitudes, simulate_to_end
 from ..shared_scenes import (
     RELEASE_ANGLE,
-    compile_looped,
     double_pendulum,
     elbow_with_spring,
     rod_with_spring,
+    sliding_mass,
     stiffness_for_frequency,
 )
 
@@ -119,22 +119,18 @@ WAVE_HEIGHT = 0.01
 TIMES = STEP * np.arange(STEPS + 1)
 
 
-def _road(rate: float) -> dict[str, object]:
-    """Scene of 1 kg on a spring of 400 N/m and a damper of 12 N s/m over waves.
+def _road(rate: float) -> Model:
+    """Model of 1 kg on a spring of 400 N/m and a damper of 12 N s/m over waves.
 
     The waves pass with an angular frequency of `rate` over the step.
     """
     wave = f"{rate / STEP!r}"
     effort = f"400*({WAVE_HEIGHT}*sin({wave}*t) - q) + 12*({WAVE_HEIGHT}*{wave}*cos({wave}*t) - u)"
-    slide = {
-        "name": "slide", "type": "prismatic", "axis": [0, 1, 0], "inboard": "ground",
-        "outboard": "mass", "law": {"effort": effort},
-    }  # fmt: skip
-    return {"gravity": [0, 0, 0], "body": [{"name": "mass", "mass": 1.0}], "hinge": [slide]}
+    return sliding_mass((0, 1, 0), effort=effort)
 
 
 def _road_error(rate: float, time_slope: bool) -> float:
-    car = compile_looped(_road(rate))
+    car = _road(rate)
     exact = simulate_to_end(car, TIMES[-1], rtol=1e-11, atol=1e-15, output_times=TIMES).q[:, 0]
     displacement: Array
     if time_slope:

@@ -13,7 +13,7 @@ from ...runtime.model.model import Model
 from ...runtime.run.spectral_radius import fastest_at_start
 from ..case_definition import LOG_SCALE, CaseDefinition, MethodDefinition
 from ..error_measures import rounding_error
-from ..shared_scenes import ROD_TRANSVERSE_INERTIA, compile_looped, random_pin_states, rod
+from ..shared_scenes import ROD_TRANSVERSE_INERTIA, compile_looped, random_pin_states, rod_chain
 
 # --- heavy-tip ------------------------------------------------------------------------------------
 
@@ -22,14 +22,7 @@ ROD_COUNT = 8
 
 def _tip_error(ratio: float, sweep: str) -> float:
     """Largest relative error of the accelerations over some random states."""
-    masses = [1.0] * (ROD_COUNT - 1) + [ratio]
-    bodies = [rod(f"rod{i}", mass=mass) for i, mass in enumerate(masses)]
-    hinges = [
-        {"name": f"pin{i}", "type": "pin", "outboard": f"rod{i}",
-         "inboard": f"rod{i - 1}.tip" if i else "ground"}
-        for i in range(ROD_COUNT)
-    ]  # fmt: skip
-    scene = {"gravity": [0, -9.81, 0], "body": bodies, "hinge": hinges}
+    scene = rod_chain([1.0] * (ROD_COUNT - 1) + [ratio])
     return rounding_error(compile_looped(scene, sweep=sweep), random_pin_states(ROD_COUNT))
 
 

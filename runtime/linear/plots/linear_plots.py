@@ -92,14 +92,12 @@ def _label_curves(axis: Any, x: Array, columns: Array, whirl: Array) -> None:
         ):
             continue
         taken.append((end, y))
+        sense = whirl[known[-1], k]
+        kind = " F" if sense > _WHIRLS else " B" if sense < -_WHIRLS else ""
         axis.annotate(
-            f"{k + 1}{_sense(whirl[known[-1], k])}", (end, y), fontsize=8,
+            f"{k + 1}{kind}", (end, y), fontsize=8,
             color=curve_style(k)["color"], va="center", xytext=(4, 0), textcoords="offset points",
         )  # fmt: skip
-
-
-def _sense(whirl: float) -> str:
-    return " F" if whirl > _WHIRLS else " B" if whirl < -_WHIRLS else ""
 
 
 def _add_legend(drawing: Any, axis: Any, labels: Sequence[str]) -> None:
@@ -119,6 +117,8 @@ def bode(
     path: str | Path | None,
 ) -> Any:
     """Plot magnitude and phase over frequency, Hz, for each column of `values` (k, curves)."""
+    from matplotlib.ticker import MaxNLocator
+
     require_columns(values)
     drawing = new_figure(7.5, 6.0)
     above, below = drawing.subplots(2, 1, sharex=True, height_ratios=[3, 2])
@@ -130,7 +130,7 @@ def bode(
     above.set_ylabel(f"magnitude in {units}" if units else "magnitude")
     below.set_ylabel("phase in degrees")
     below.set_xlabel("frequency in Hz")
-    below.yaxis.set_major_locator(_right_angle_locator())
+    below.yaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 1.8, 3, 4.5, 9, 10]))
     for axis in (above, below):
         axis.grid(which="minor", lw=0.4)
     _add_legend(drawing, above, labels)
@@ -186,12 +186,6 @@ def waterfall(
     axis.set_xlabel("frequency in Hz")
     axis.set_ylabel(about)
     return write_figure(drawing, path)
-
-
-def _right_angle_locator() -> Any:
-    from matplotlib.ticker import MaxNLocator
-
-    return MaxNLocator(nbins=6, steps=[1, 1.8, 3, 4.5, 9, 10])
 
 
 def require_columns(values: NDArray[Any]) -> None:

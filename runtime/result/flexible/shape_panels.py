@@ -251,10 +251,8 @@ def panel_names(result: Record) -> Iterator[str]:
         yield f"{name}.modal_energy"
 
 
-def shape_panel(result: Record, name: str) -> ShapePanel | None:
-    """Shape panel of this name; None if there is none."""
-    if name not in panel_names(result):
-        return None
+def shape_panel(result: Record, name: str) -> ShapePanel:
+    """Shape panel of a name, one of `panel_names`."""
     body, kind = split_reference(name) if "." in name else ("", name)
     if kind == "shape":
         return _strip_panel(result, [body] if body else None)

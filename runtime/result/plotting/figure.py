@@ -67,8 +67,9 @@ def draw_runs(
         if curves or not selection.names
         else []
     )
+    record: Any = next(iter(runs.values()))
     return _compose_figure(
-        [_shape_panel(runs, name) for name in shapes], shapes, quantity_panels, title, ax
+        [shape_panel(record, name) for name in shapes], shapes, quantity_panels, title, ax
     )
 
 
@@ -160,13 +161,6 @@ def _split_names(
     )
 
 
-def _shape_panel(runs: Mapping[str, PlotSource], name: str) -> ShapePanel:
-    record: Any = next(iter(runs.values()))
-    panel = shape_panel(record, name)
-    assert panel is not None, name
-    return panel
-
-
 def _lay_out(figure: Any, shape_panels: Sequence[ShapePanel]) -> None:
     """Arrange the panels in a column; panels over time share one time axis below the last."""
     groups = [[panel] for panel in shape_panels if not panel.over_time]
@@ -240,7 +234,7 @@ def _legend_entries(axis: Any, panel: Panel) -> list[Any]:
             for run, look in by_run.items()
         ]
     if panel.more:
-        handles.append(Line2D([], [], linestyle=" ", label=_wrap_text(panel.more)))
+        handles.append(Line2D([], [], linestyle=" ", label=textwrap.fill(panel.more, 22)))
     return handles
 
 
@@ -264,7 +258,3 @@ def _set_amplitude_axis(axis: Any, panel: Panel) -> None:
     if largest > 0:
         axis.set_yscale("log")
         axis.set_ylim(_MIN_AMPLITUDE_RATIO * largest, 2 * largest)
-
-
-def _wrap_text(text: str) -> str:
-    return "\n".join(textwrap.wrap(text, 22))

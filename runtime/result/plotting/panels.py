@@ -99,14 +99,9 @@ def spectrum(t: Array, quantity: Quantity) -> tuple[Array, Array]:
         values = interpolate(
             t, values, None if rates is None else rates[unique_indices], even_times
         )
+    rate, points = 1 / (even_times[1] - even_times[0]), _FREQUENCY_REFINEMENT * len(even_times)
     frequencies, powers = periodogram(
-        values,
-        1 / (even_times[1] - even_times[0]),
-        "hann",
-        _FREQUENCY_REFINEMENT * len(even_times),
-        "constant",
-        scaling="spectrum",
-        axis=0,
+        values, rate, "hann", points, "constant", scaling="spectrum", axis=0
     )
     return frequencies, np.sqrt(2 * powers)
 
@@ -219,11 +214,15 @@ def _build_panel(
     runs: Mapping[str, PlotSource], group: DefaultPanel, selection: PlotSelection
 ) -> Panel:
     quantities = [_first_quantity(runs, name) for name in group.names]
-    labels = [label for quantity in quantities for label in column_labels(quantity)]
+    labels: list[str] = []
+    first_columns: list[int] = []
+    for quantity in quantities:
+        first_columns.append(len(labels))
+        labels += column_labels(quantity)
     is_single = len(labels) == 1
     traces, missing_notes = [], []
     for number, (run_label, run) in enumerate(runs.items()):
-        for name, first_column in zip(group.names, _first_columns(quantities), strict=True):
+        for name, first_column in zip(group.names, first_columns, strict=True):
             try:
                 quantity = run.quantity(name)
             except SceneError:
@@ -265,12 +264,6 @@ def constant_axis_limits(panel: Panel) -> tuple[float, float] | None:
         return None
     middle = (low + high) / 2
     return middle - min_span / 2, middle + min_span / 2
-
-
-def _first_columns(quantities: Sequence[Quantity]) -> list[int]:
-    """Index of the first column of each quantity."""
-    counts = [len(column_labels(quantity)) for quantity in quantities]
-    return [sum(counts[:k]) for k in range(len(counts))]
 
 
 def _drawn_curves(

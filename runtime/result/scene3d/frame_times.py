@@ -130,15 +130,10 @@ class FrameTimes:
 
     def path(self, run: Record, reference: str) -> Array:
         """Path (n, 3) in m of a body's origin or an end, in finer time steps than the frames."""
-        trail_times = replace(
-            self, times=np.linspace(self.times[0], self.times[-1], self._path_point_count)
-        )
+        point_count = _TRAIL_POINTS_PER_FRAME * (len(self.times) - 1) + 1
+        trail_times = replace(self, times=np.linspace(self.times[0], self.times[-1], point_count))
         points = run._observations.points(reference)[self.samples]
         return trail_times.interpolate_hermite(points[:, 0:3], points[:, 3:6])
-
-    @property
-    def _path_point_count(self) -> int:
-        return _TRAIL_POINTS_PER_FRAME * (len(self.times) - 1) + 1
 
     def poses(self, run: Record, reference: str) -> Poses:
         """Poses of the axes of a body or an end."""

@@ -80,7 +80,8 @@ def rigid_body_solids(
         yield Solid(owner, "inertia", inertia_box, colour, opacity, hidden)
     if (body.mass and outer_points) or inertia_box is None:
         ball = ellipsoid_surface((radius, radius, radius), 12).with_pose(centre)
-        yield Solid(owner, "mass", ball, _darken(colour))
+        red, green, blue = (int(0.55 * c) for c in colour)
+        yield Solid(owner, "mass", ball, (red, green, blue))
 
 
 def bar_radius(length: float, size: float) -> float:
@@ -126,11 +127,6 @@ def body_centre(body: BodyTable) -> Array:
         return np.array(body.center_of_mass)
     ends = [body.end_position(end) for end in body.ends]
     return np.mean([(0.0, 0.0, 0.0), *ends], axis=0)
-
-
-def _darken(colour: Colour) -> Colour:
-    r, g, b = (int(0.55 * c) for c in colour)
-    return (r, g, b)
 
 
 # --- beams as bent tubes, elastic bodies by their meshes ------------------------------------------
@@ -234,7 +230,9 @@ def shape_solid(
     """
     local_surface = _shape_surface(shape, kept).with_pose(shape.position, np.array(shape.rotation))
     owner = "ground" if shape.is_on_ground else f"bodies/{shape.owner}"
-    colour = colour if shape.color is None else _parse_colour(shape.color)
+    if shape.color is not None:
+        red, green, blue = bytes.fromhex(shape.color[1:])
+        colour = red, green, blue
     return Solid(
         owner, shape.name, local_surface.with_pose(at, np.array(axes)), colour, shape.opacity
     )
@@ -282,10 +280,6 @@ def _read_mesh(shape: Shape, content: bytes | None) -> Surface:
     return Surface(vertices * (shape.scale or 1.0), faces.astype(np.int64))
 
 
-def _parse_colour(text: str) -> Colour:
-    return (int(text[1:3], 16), int(text[3:5], 16), int(text[5:7], 16))
-
-
 # --- hinges by their degrees of freedom, coils of springs, ground blocks --------------------------
 
 HINGE_COLOUR: Colour = (60, 66, 74)
@@ -310,15 +304,18 @@ def hinge_glyph(hinge: Hinge, r: float) -> Surface | None:
     if facts.welds:
         return box_surface((1.3 * r, 1.3 * r, 1.3 * r))
     axes = np.array(hinge_frames(hinge)[1])
+    # Translation and rotation of each speed at the start, axes of the outboard end.
+    motions = [(np.array(t), np.array(w)) for t, w in initial_motion_axes(hinge) or ()]
+    slides = [t for t, w in motions if np.linalg.norm(t) > 0 and not np.linalg.norm(w) > 0]
     parts = []
     if len(facts.turns) == 3 or not facts.constant_subspace:
         parts.append(ellipsoid_surface((r, r, r), 16))
     else:
         parts += [
             cylinder_surface(0.75 * r, 3.2 * r).with_pose(axes=axes_along(v))
-            for v in _rotation_axes(hinge)
+            for _, v in motions
+            if np.linalg.norm(v) > 0
         ]
-    slides = _slide_axes(hinge)
     if len(slides) == 2:
         parts.append(box_surface((5 * r, 5 * r, 0.4 * r)).with_pose(axes=axes))
     else:
@@ -326,38 +323,12 @@ def hinge_glyph(hinge: Hinge, r: float) -> Surface | None:
             box_surface((1.1 * r, 1.1 * r, 7 * r)).with_pose(axes=axes_along(v)) for v in slides
         ]
     if facts.frame == "crossing":
+        second = hinge.unit_axis if hinge.unit_axis2 is None else hinge.unit_axis2
         parts = [
             cylinder_surface(0.6 * r, 4 * r).with_pose(axes=axes_along(v))
-            for v in _crossing_axes(hinge)
+            for v in (hinge.unit_axis, second)
         ]
     return join_surfaces(parts) if parts else ellipsoid_surface((r, r, r), 8)
-
-
-def _hinge_motions(hinge: Hinge) -> list[tuple[Array, Array]]:
-    """Translation and rotation of each speed at the start, axes of the outboard end."""
-    return [(np.array(t), np.array(w)) for t, w in initial_motion_axes(hinge) or ()]
-
-
-def _rotation_axes(hinge: Hinge) -> list[Array]:
-    return [w for _, w in _hinge_motions(hinge) if np.linalg.norm(w) > 0]
-
-
-def _slide_axes(hinge: Hinge) -> list[Array]:
-    return [
-        t for t, w in _hinge_motions(hinge) if np.linalg.norm(t) > 0 and not np.linalg.norm(w) > 0
-    ]
-
-
-def _crossing_axes(hinge: Hinge) -> list[Array]:
-    second = hinge.unit_axis if hinge.unit_axis2 is None else hinge.unit_axis2
-    return [np.array(hinge.unit_axis), np.array(second)]
-
-
-def ground_block(at: Array, r: float) -> Solid:
-    """Block of an attachment to the ground; `at` (3,) in m."""
-    return Solid(
-        "ground", "", box_surface((2.6 * r, 2.6 * r, 2.6 * r)).with_pose(at), GROUND_COLOUR
-    )
 
 
 def spring_coil(start: Array, end: Array, widest: float) -> Array:

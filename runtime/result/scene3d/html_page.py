@@ -52,15 +52,10 @@ def render_page(stage: SceneGraph) -> str:
         for k in range(len(stage.times)):
             animated_scene.show_frame(k)
             if k + 1 < len(stage.times):
-                recorder.insert_sleep(_frame_pause(stage))
+                duration = float(stage.times[-1] - stage.times[0])
+                recorder.insert_sleep(duration / stage.speed / (len(stage.times) - 1))
         text: str = recorder.as_html()
     return _insert_script(text, stage)
-
-
-def _frame_pause(stage: SceneGraph) -> float:
-    """Seconds of film from one frame to the next."""
-    duration = float(stage.times[-1] - stage.times[0])
-    return duration / stage.speed / (len(stage.times) - 1)
 
 
 @contextmanager

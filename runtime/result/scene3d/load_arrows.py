@@ -94,23 +94,16 @@ class LoadArrows:
         """Arrows of forces and moments, all of one kind to one scale."""
         max_force = max((_max_norm(history.force) for history in self.histories), default=0.0)
         max_moment = max((_max_norm(history.moment) for history in self.histories), default=0.0)
-        shaft_radius = _SHAFT_RADIUS * self.size
         for history in self.histories:
-            if _max_norm(history.force) > 0:
-                scale = 1.0 if len(history.positions) == 1 else _LINE_LOAD_SCALE
-                vector = scale * _FORCE_LENGTH * self.size / max_force * history.force
-                arrow_meshes = [
-                    straight_arrows(position, vector, shaft_radius)
-                    for position in history.positions
-                ]
-                yield _joined_arrows(f"forces/{history.load.name}", arrow_meshes)
-            if _max_norm(history.moment) > 0:
-                vector = _MOMENT_RADIUS * self.size / max_moment * history.moment
-                arrow_meshes = [
-                    circular_arrows(position, vector, shaft_radius)
-                    for position in history.positions
-                ]
-                yield _joined_arrows(f"moments/{history.load.name}", arrow_meshes)
+            line_scale = 1.0 if len(history.positions) == 1 else _LINE_LOAD_SCALE
+            for kind, draw, vectors, length, largest in (
+                ("forces", straight_arrows, history.force, line_scale * _FORCE_LENGTH, max_force),
+                ("moments", circular_arrows, history.moment, _MOMENT_RADIUS, max_moment),
+            ):
+                if _max_norm(vectors) > 0:
+                    scaled = length * self.size / largest * vectors
+                    meshes = [draw(p, scaled, _SHAFT_RADIUS * self.size) for p in history.positions]
+                    yield _joined_arrows(f"{kind}/{history.load.name}", meshes)
 
     def poses(self) -> Iterator[tuple[str, Poses]]:
         """Owners of the labels of loads on the page, with their poses."""
@@ -120,10 +113,13 @@ class LoadArrows:
     def label_texts(self) -> Iterator[tuple[str, ObjectLabel]]:
         """Labels of loads on the page."""
         for history in self.histories:
-            numbers = [(f"force {x}", "N", v) for x, v in zip("xyz", history.force.T, strict=True)]
-            numbers += [
-                (f"moment {x}", "N m", v) for x, v in zip("xyz", history.moment.T, strict=True)
-            ]
+            numbers = [
+                (f"{kind} {x}", unit, v)
+                for kind, unit, vectors in (
+                    ("force", "N", history.force), ("moment", "N m", history.moment)
+                )
+                for x, v in zip("xyz", vectors.T, strict=True)
+            ]  # fmt: skip
             nonzero = [number for number in numbers if number[2].any()]
             labels = tuple((label, unit) for label, unit, _ in nonzero)
             values = np.array([v for *_, v in nonzero]).reshape(len(nonzero), len(history.force)).T

@@ -18,7 +18,7 @@ from . import geometry
 from .frame_times import FrameTimes
 from .load_arrows import LoadArrows, gravity_arrow
 from .scene_graph import DeformingSurface, Line, ObjectLabel, Poses, SceneGraph, Solid
-from .solid_meshes import Colour, ellipsoid_surface
+from .solid_meshes import Colour, box_surface, ellipsoid_surface
 
 if TYPE_CHECKING:
     from ..result_record import Record
@@ -213,8 +213,9 @@ class _SceneBuilder:
     def _feet(self) -> Iterator[Solid]:
         radii_by_position = {hinge.position: self._girth(hinge) for hinge in self._ground_hinges()}
         for number, (at, girth) in enumerate(radii_by_position.items(), 1):
-            foot = geometry.ground_block(np.array(at), _FOOT_RADIUS_RATIO * girth)
-            yield Solid(foot.owner, f"{number}", foot.surface, foot.colour)
+            edge = 2.6 * (_FOOT_RADIUS_RATIO * girth)
+            surface = box_surface((edge, edge, edge)).with_pose(at)
+            yield Solid("ground", f"{number}", surface, geometry.GROUND_COLOUR)
 
     # --- lines ------------------------------------------------------------------------------------
 

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TypeVar
 
 import numpy as np
 
@@ -125,25 +124,23 @@ class SceneGraph:
 
     def with_scale(self, factor: float) -> SceneGraph:
         """Scene graph scaled by a factor; the values of labels are unchanged."""
-        scaled_poses = {owner: replace(pose, position=factor * pose.position)
-                 for owner, pose in self.poses.items()}  # fmt: skip
-        solids = tuple(
-            replace(item, surface=item.surface.with_scale(factor)) for item in self.solids
-        )
-        bent = tuple(
-            replace(item, vertices=factor * item.vertices) for item in self.deforming_surfaces
-        )
-        lines = tuple(replace(item, points=factor * item.points) for item in self.lines)
-        labels = {
-            owner: replace(item, anchor=factor * item.anchor) for owner, item in self.labels.items()
-        }
         return replace(
             self,
-            poses=scaled_poses,
-            solids=solids,
-            deforming_surfaces=bent,
-            lines=lines,
-            labels=labels,
+            poses={
+                owner: replace(pose, position=factor * pose.position)
+                for owner, pose in self.poses.items()
+            },
+            solids=tuple(
+                replace(item, surface=item.surface.with_scale(factor)) for item in self.solids
+            ),
+            deforming_surfaces=tuple(
+                replace(item, vertices=factor * item.vertices) for item in self.deforming_surfaces
+            ),
+            lines=tuple(replace(item, points=factor * item.points) for item in self.lines),
+            labels={
+                owner: replace(label, anchor=factor * label.anchor)
+                for owner, label in self.labels.items()
+            },
         )
 
     @cached_property
@@ -195,46 +192,31 @@ def _sampled_points(points: Array) -> Array:
 # --- several scenes on one page, shown one at a time: modes, rows of a batch ----------------------
 
 Part = tuple[str, SceneGraph]
-T = TypeVar("T")
 
 
 def combine_stages(title: str, parts: Sequence[Part]) -> SceneGraph:
     """Combine scenes over the same frame times; names of objects are prefixed by their part."""
-    first = parts[0][1]
-    notes = dict.fromkeys(note for _, stage in parts for note in stage.notes)
+    stages = [(f"{name}/", stage) for name, stage in parts]
     return replace(
-        first,
+        parts[0][1],
         title=title,
-        notes=tuple(notes),
+        notes=tuple(dict.fromkeys(note for _, stage in stages for note in stage.notes)),
         choices=tuple(name for name, _ in parts),
-        poses=dict(_with_prefix((name, stage.poses) for name, stage in parts)),
-        labels=dict(_with_prefix((name, stage.labels) for name, stage in parts)),
+        poses={f"{at}{owner}": pose for at, stage in stages for owner, pose in stage.poses.items()},
+        labels={
+            f"{at}{owner}": text for at, stage in stages for owner, text in stage.labels.items()
+        },
         solids=tuple(
-            _solid_with_prefix(name, item) for name, stage in parts for item in stage.solids
+            replace(item, owner=f"{at}{item.owner}")
+            for at, stage in stages
+            for item in stage.solids
         ),
         deforming_surfaces=tuple(
-            _named_with_prefix(name, item)
-            for name, stage in parts
+            replace(item, name=f"{at}{item.name}")
+            for at, stage in stages
             for item in stage.deforming_surfaces
         ),
         lines=tuple(
-            _named_with_prefix(name, item) for name, stage in parts for item in stage.lines
+            replace(item, name=f"{at}{item.name}") for at, stage in stages for item in stage.lines
         ),
     )
-
-
-NamedObject = TypeVar("NamedObject", DeformingSurface, Line)
-
-
-def _with_prefix(parts: Iterator[tuple[str, Mapping[str, T]]]) -> Iterator[tuple[str, T]]:
-    for name, values_by_owner in parts:
-        for owner, value in values_by_owner.items():
-            yield f"{name}/{owner}", value
-
-
-def _solid_with_prefix(name: str, solid: Solid) -> Solid:
-    return replace(solid, owner=f"{name}/{solid.owner}")
-
-
-def _named_with_prefix(name: str, named_object: NamedObject) -> NamedObject:
-    return replace(named_object, name=f"{name}/{named_object.name}")

@@ -114,7 +114,7 @@ def write_film(shots: Sequence[Frame], path: Path) -> None:
     figure, axis = _frame_figure(shots[0].flat)
     from matplotlib import animation, rc_context
 
-    duration = _film_duration(stage)
+    duration = float(stage.times[-1] - stage.times[0]) / stage.speed
     rate = max(1, round((len(stage.times) - 1) / duration)) if duration else 1
     gif = path.suffix.lower() == ".gif"
     frame_step = max(1, round(rate / _MAX_GIF_RATE)) if gif else 1
@@ -168,10 +168,6 @@ def _frame_title(title: str, stage: SceneGraph, k: int) -> str:
     rate = "" if stage.speed == 1 or unit != "s" else f"   (speed {stage.speed:g})"
     digits = stage.digits if unit == "s" else 0
     return f"{title}   {quantity} = {stage.times[k]:.{digits}f} {unit}{rate}"
-
-
-def _film_duration(stage: SceneGraph) -> float:
-    return float(stage.times[-1] - stage.times[0]) / stage.speed
 
 
 def _new_figure(wide: float, tall: float) -> Any:

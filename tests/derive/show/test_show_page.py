@@ -18,7 +18,7 @@ from mstmm.derive.equations.rigid_body import rigid_body
 from mstmm.derive.show.formula_layout import layout
 from mstmm.derive.show.markup import latex_text, mathml
 from mstmm.derive.show.plain_text import WIDTH, column_count, wrap_formula
-from mstmm.derive.show.show_page import FORMATS, STAGES, ElementView, show, show_view
+from mstmm.derive.show.show_page import FORMATS, STAGES, ElementView, show_view
 from mstmm.derive.show.symbol_names import SymbolName, parse_name, unit_text
 from mstmm.derive.show.vector_recognition import recognise_matrix
 from mstmm.errors import ElementError
@@ -49,7 +49,7 @@ def body_view() -> ElementView:
 @pytest.mark.parametrize("at", STAGES)
 @pytest.mark.parametrize("name", NAMES)
 def test_text_fits_the_page_and_names_units_and_sources(name: str, at: str) -> None:
-    text = show(name, at, "text", view)
+    text = show_view(view(name), at, "text")
     assert "source: Rui, Wang, Zhang" in text
     assert "N·m" in text and "m/s²" in text
     if at in ("equations", "matrix"):
@@ -60,7 +60,7 @@ def test_text_fits_the_page_and_names_units_and_sources(name: str, at: str) -> N
 @pytest.mark.parametrize("at", STAGES)
 @pytest.mark.parametrize("name", NAMES)
 def test_html_is_well_formed_and_self_contained(name: str, at: str) -> None:
-    html = show(name, at, "html", view)
+    html = show_view(view(name), at, "html")
     root = ElementTree.fromstring(html.removeprefix("<!DOCTYPE html>\n"))
     assert root.tag == "html"
     assert "N·m" in html and "m/s²" in html
@@ -73,7 +73,7 @@ def test_html_is_well_formed_and_self_contained(name: str, at: str) -> None:
 @pytest.mark.parametrize("at", STAGES)
 @pytest.mark.parametrize("name", NAMES)
 def test_latex_is_balanced(name: str, at: str) -> None:
-    source = show(name, at, "latex", view)
+    source = show_view(view(name), at, "latex")
     assert r"N\,m" in source and r"m/s\textsuperscript{2}" in source
     assert "Rui, Wang, Zhang" in source
     assert_balanced(source)
@@ -99,7 +99,7 @@ def assert_balanced(source: str) -> None:
 
 
 def test_matrix_stage_shows_the_block_form() -> None:
-    lines = show("body_spatial", "matrix", "text", view).splitlines()
+    lines = show_view(view("body_spatial"), "matrix", "text").splitlines()
     start = next(k for k, line in enumerate(lines) if line.strip().startswith("transfer matrix"))
     rows = [line.split("⎢")[-1].strip(" ⎢⎥⎤⎦⎡⎣U=").split("  ") for line in lines[start + 1 :][:5]]
     cells = [[cell.strip() for cell in row if cell.strip()] for row in rows]
@@ -113,13 +113,13 @@ def test_matrix_stage_shows_the_block_form() -> None:
 
 
 def test_equations_stage_states_the_premises() -> None:
-    text = show("body_spatial", "equations", "text", view)
+    text = show_view(view("body_spatial"), "equations", "text")
     assert "r̈_O = r̈_I + b_O − r̃_IO ω̇_I" in text
     assert "Newton, mass centre · (5.20)" in text
 
 
 def test_ir_stage_lists_every_statement() -> None:
-    text = show("ball", "ir", "text", view)
+    text = show_view(view("ball"), "ir", "text")
     kernel = classical_spec("ball").kernels[0]
     assert len(re.findall(r"^t\d+ = ", text, flags=re.M)) == sum(kernel.operation_counts().values())
     assert "return code 2 unless" in text
@@ -127,7 +127,7 @@ def test_ir_stage_lists_every_statement() -> None:
 
 def test_c_stage_is_the_generated_source() -> None:
     source = element_source(classical_spec("pin_planar"))
-    assert source.strip() in show("pin_planar", "c", "text", view)
+    assert source.strip() in show_view(view("pin_planar"), "c", "text")
 
 
 @pytest.mark.parametrize("format", FORMATS)
@@ -142,7 +142,7 @@ def test_bodies_with_branches_are_shown(format: str) -> None:
 )
 def test_unknown_words_are_refused(at: str, format: str, name: str) -> None:
     with pytest.raises(ElementError, match=r"unknown (stage|format)|no element"):
-        show(name, at, format, view)
+        show_view(view(name), at, format)
 
 
 # --- expressions ------------------------------------------------------------------------------
