@@ -25,7 +25,7 @@ from mstmm.runtime.experiments.model_reduction.body_models import (
     BodyModel,
 )
 from mstmm.runtime.experiments.model_reduction.trial_models import Renaming
-from mstmm.runtime.result.flexible.modal_energy import modal_frequencies
+from mstmm.runtime.result.flexible.momentum import modal_frequencies
 from mstmm.runtime.result.one_way.result import OneWayResult
 
 #: Number of times at which errors are compared, different from those of an advice.

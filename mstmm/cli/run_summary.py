@@ -87,7 +87,7 @@ def method_lines(result: Result, width: int) -> list[str]:
 
 def fitting_table(result: Result, names: tuple[str, ...], rows: int, width: int) -> str:
     """Table of some samples; on a narrow terminal default columns are left out."""
-    from mstmm.runtime.result.export.text_table import default_names
+    from mstmm.runtime.result.export.column_files import default_names
 
     pictures = result.picture_names()
     numeric_names = [name for name in names if name not in pictures]

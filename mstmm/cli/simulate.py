@@ -132,9 +132,9 @@ def _save_result(plan: RunOptions, result: Result, seconds: float, progress: Pro
     """
     is_short = seconds < MAX_SHORT_RUN and not plan.resume and plan.error is None
     if result.trajectory.is_comparable and (is_short if plan.certify is None else plan.certify):
-        from mstmm.runtime.result.export import result_files
+        from mstmm.runtime.result.export import xarray_dataset
 
-        result_files.save_result(result, plan.result_file)
+        xarray_dataset.save_result(result, plan.result_file)
         from mstmm.runtime.experiments.run_results import certify_result
 
         progress.label("estimating the error")

@@ -187,19 +187,11 @@ class LinearisationCall:
         n, record = self._n, engine.ffi.new("mstmm_linear_alone *")
         record.code, record.efforts = self._record[0], self._no_efforts
         record.found = result_pointer = engine.pointer(np.empty(numbers))
+        square, kept = (n, n), (self._references, result_pointer)
+        shapes = (engine.nu,), square, square, square, (n,), square, square
+        widths = engine.nq, engine.nu
         return prepare_call(
-            "mstmm_linear_derivatives",
-            record,
-            (engine.nq, engine.nu),
-            (engine.nu,),
-            (n, n),
-            (n, n),
-            (n, n),
-            (n,),
-            (n, n),
-            (n, n),
-            numbered=True,
-            kept=(self._references, result_pointer),
+            "mstmm_linear_derivatives", record, widths, *shapes, numbered=True, kept=kept
         )
 
     def evaluate(self, t: float, q: Array, u: Array) -> CompiledState | None:
@@ -222,15 +214,9 @@ class LinearisationCall:
         buffer, real, n = self._ffi.from_buffer, self._real, self._n
         numbers, derivatives = np.empty(self._numbers), np.empty((n, 3 * n + 1))
         efforts_pointer = self._no_efforts if efforts is None else buffer(real, efforts)
-        is_failed = self._lib.mstmm_accelerations_about(
-            self._record,
-            t,
-            buffer(real, q),
-            buffer(real, u),
-            efforts_pointer,
-            buffer(real, numbers),
-            buffer(real, derivatives),
-        )
+        state = t, buffer(real, q), buffer(real, u), efforts_pointer
+        results = buffer(real, numbers), buffer(real, derivatives)
+        is_failed = self._lib.mstmm_accelerations_about(self._record, *state, *results)
         return None if is_failed else (CompiledState(numbers, self._nu, n), derivatives)
 
     def state_matrix(self, about: CompiledState, turning: bool) -> Array | None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol, Self
 import numpy as np
 
 from mstmm.array_validation import Array
+from mstmm.errors import EnvironmentFailure
 
 from .inputs import IndexPairs
 
@@ -75,12 +76,7 @@ class NoFusedCode:
     numbers: Array = field(default_factory=lambda: np.zeros(0))
     inputs: IndexPairs = ()
 
-    def find(self) -> None:
-        return None
-
     def build(self) -> FusedLibrary:
-        from mstmm.errors import EnvironmentFailure
-
         raise EnvironmentFailure(f'{self.obstacle}; use mstmm.compile(scene, engine="fused")')
 
     def follow(self, other: Any) -> None:
@@ -89,32 +85,14 @@ class NoFusedCode:
     def for_system(self, system: System) -> Self:
         return self
 
-    def ready(self, evaluations: float) -> None:
-        return None
-
-    def ready_lanes(self, evaluations: float) -> None:
-        return None
-
-    def ready_implicit(self, evaluations: float) -> None:
-        return None
-
-    def ready_linear(self, pays: bool) -> None:
-        return None
-
-    def ready_inverse(self, calls: float) -> None:
-        return None
-
-    def ready_points(self, body: int, calls: float) -> None:
-        return None
-
     def structure_ir(self, structure: Any) -> Any:
         return self.build()
 
-    def columns(self, structure: Any, kernels: Callable[[], Any], what: str, build: bool) -> None:
-        return None
-
-    def solution(self, build: bool) -> None:
-        return None
-
     def symbolic(self, linear: Any, keep: Sequence[str]) -> Any:
         return self.build()
+
+    def _find_nothing(self, *_: Any, **__: Any) -> None:
+        return None
+
+    find = ready = ready_lanes = ready_implicit = ready_linear = _find_nothing
+    ready_inverse = ready_points = columns = solution = _find_nothing

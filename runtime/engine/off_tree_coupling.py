@@ -148,18 +148,9 @@ def single_group(bodies: Sequence[int], efforts: Any, rows: Any, nu: int) -> Off
     """Put all unknowns in one group, with one pass for each and a full matrix."""
     count = 6 * len(bodies) + len(efforts) + len(rows)
     all_unknowns, last_index = [range(count)], max(count - 1, 0)
-    return OffTreeCoupling(
-        bodies,
-        efforts,
-        rows,
-        all_unknowns,
-        all_unknowns,
-        [range(nu)],
-        [[k] for k in range(count)],
-        np.arange(count),
-        last_index,
-        last_index,
-    )
+    passes, ranks = [[k] for k in range(count)], np.arange(count)
+    groups = all_unknowns, all_unknowns, [range(nu)], passes, ranks, last_index, last_index
+    return OffTreeCoupling(bodies, efforts, rows, *groups)
 
 
 def _independent_groups(
@@ -252,13 +243,8 @@ def _branch_of_bodies(system: System) -> list[int]:
     )
     for tree_index, parent in enumerate(system.parents.tolist()):
         is_parent_fixed = parent == GROUND or branches[parent] == GROUND
-        branches.append(
-            branches[parent]
-            if not is_parent_fixed
-            else GROUND
-            if is_immobile[tree_index]
-            else tree_index
-        )
+        first_movable = GROUND if is_immobile[tree_index] else tree_index
+        branches.append(first_movable if is_parent_fixed else branches[parent])
     return branches
 
 

@@ -13,7 +13,7 @@ from ..integrate.settings import Settings
 from ..result.checks.answer_checks import apply_policy, check_start
 from ..result.checks.check import RunStart
 from ..result.checks.run_checks import PreRunFindings
-from ..result.factory import result_of
+from ..result.one_way.result import result_of
 from ..result.result import Result
 from ..run.checkpoint import Checkpoint
 from ..run.run_execution import RunMonitor, first_run, second_run

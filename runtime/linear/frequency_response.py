@@ -50,8 +50,7 @@ from .harmonic.response_risks import (
 )
 from .input_channels import Channel, channel, some_names
 from .mck_matrices import Matrices
-from .outputs.linear_outputs import outputs_of, read_by, rows_of
-from .outputs.output_rows import LinearQuantity
+from .outputs import LinearQuantity, outputs_of, read_by, rows_of
 from .validity import find_response_risks
 
 if TYPE_CHECKING:

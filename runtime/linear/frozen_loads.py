@@ -20,7 +20,7 @@ from ..kernels.tape_kernel import TapeKernel
 from ..packing.expression_tapes import constant_kernel
 from ..packing.scene_packing import packed_system
 from ..packing.system import ForceNumbers, LoadNumbers, System
-from ..result.sources.bushings import deflection_of
+from ..result.element_quantities import deflection_of
 from .mck_matrices import State
 
 INERTIAL = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)

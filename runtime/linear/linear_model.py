@@ -27,7 +27,7 @@ from .harmonic.response_risks import check_steady_outputs
 from .input_channels import Channel, some_names
 from .mode_solvers import modes
 from .modes import Modes
-from .outputs.linear_outputs import outputs_of, rows_of
+from .outputs import outputs_of, rows_of
 from .rotors import fixed_frame_transform, frame_of
 from .state_space import StateSpace
 from .validity import find_linear_risks

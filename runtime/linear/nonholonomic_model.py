@@ -48,11 +48,11 @@ from .nonholonomic_perturbations import (
 )
 from .operating_point.later_states import SAME, relative_difference
 from .operating_point.omitted_effects import IndependentMotions, friction_risks, saturation_risks
-from .outputs.linear_outputs import Rows, outputs_of, rows_of
+from .outputs import Rows, outputs_of, rows_of
 from .validity import find_omissions, find_response_risks, ineffective_input_risks
 
 if TYPE_CHECKING:
-    from .outputs.output_rows import LinearQuantity
+    from .outputs import LinearQuantity
 
 
 Complex = NDArray[np.complex128]

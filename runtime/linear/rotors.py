@@ -293,8 +293,8 @@ def _drift(linear: LinearEquations) -> Array:
     sums = engine.observe(*of, (), parts=("sums",)).sums[0]
     points = _points(linear, state, state.u[None])[0]
     size = np.linalg.norm(points[:, POINT_COLUMNS["velocity"]], axis=1).max()
-    momentum = np.linalg.norm(sums[SUMS["momentum"][2]]) * size
-    if momentum <= _NO_DRIFT * sums[SUMS["energy.kinetic"][2]]:
+    momentum = np.linalg.norm(sums[SUMS["momentum"].columns]) * size
+    if momentum <= _NO_DRIFT * sums[SUMS["energy.kinetic"].columns]:
         return np.zeros(3)
     least = np.linalg.norm(points[:, POINT_COLUMNS["angular_velocity"]], axis=1).argmin()
     return np.asarray(points[least, POINT_COLUMNS["velocity"]])

@@ -11,7 +11,7 @@ from mstmm.array_validation import Array
 
 from .input_channels import Channel
 from .linear_equations import LinearEquations
-from .outputs.linear_outputs import Rows
+from .outputs import Rows
 
 
 class StateSpace(LinearEquations):

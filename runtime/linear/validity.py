@@ -24,7 +24,7 @@ from .operating_point.omitted_effects import (
     independent_motions,
     saturation_risks,
 )
-from .outputs.linear_outputs import unavailable_outputs
+from .outputs import unavailable_outputs
 from .rotors import find_blades
 
 if TYPE_CHECKING:

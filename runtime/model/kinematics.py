@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from .derivatives import Differentiation
 
 _AXES = slice(15, 24)
-_MOMENTA = slice(SUMS["momentum"][2].start, SUMS["angular_momentum"][2].stop)
+_MOMENTA = slice(SUMS["momentum"].columns.start, SUMS["angular_momentum"].columns.stop)
 
 
 class KinematicQueries(CompiledScene):
@@ -111,15 +111,17 @@ class KinematicQueries(CompiledScene):
         """
         total = self._single_state.energy(t, q, u)
         if total is None:
-            total = np.asarray(self._observe_sums(q, u, t)[..., SUMS["energy"][2]].sum(axis=-1))
+            total = np.asarray(
+                self._observe_sums(q, u, t)[..., SUMS["energy"].columns].sum(axis=-1)
+            )
         return copy_to(out, total)
 
     def energy_components(self, q: ArrayLike, u: ArrayLike, t: ArrayLike = 0.0) -> dict[str, Array]:
         """Parts of `energy` by name, (...) each in J: kinetic, gravity, springs."""
         sums = self._observe_sums(q, u, t)
         return {
-            name.removeprefix("energy."): sums[..., columns.start]
-            for name, (_, _, columns) in SUMS.items() if name.startswith("energy.")
+            name.removeprefix("energy."): sums[..., kind.columns.start]
+            for name, kind in SUMS.items() if name.startswith("energy.")
         }  # fmt: skip
 
     def momentum(

@@ -157,7 +157,7 @@ class Model(LinearAnalysis, SimulatedScene, PublicMembers, NotebookDisplay):
     def check_outputs(self) -> None:
         """Raise SceneError for outputs and controller measurements that results do not have."""
         if self.scene.output or self.scene.controller:
-            from ..result.scene_outputs import quantity_of
+            from ..result.quantity_names import quantity_of
 
             start = self.simulate(0.0, "dop853")
             for output in self.scene.output:

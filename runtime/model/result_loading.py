@@ -20,11 +20,10 @@ from ..engine.fused_code import NoFusedCode
 from ..kernels import kernel_store
 from ..kernels.prebuilt_kernels import kernels_hash
 from ..platform_support.safe_files import require_regular_file, seal_is_broken
-from ..result import mesh_files
 from ..result.batch_result import BATCH_FORMAT
 from ..result.export import provenance
 from ..result.export.column_files import READERS, ColumnFile
-from ..result.factory import result_of
+from ..result.one_way.result import result_of
 from ..result.result import Result
 from ..result.result_record import Record
 from ..run.trajectory import Trajectory
@@ -160,5 +159,5 @@ def _rebuild_result(data: Any, path: Path) -> Result:
         note = "saved with other kernels: quantities beyond q and u come from the present ones"
         run = replace(run, notes=(*run.notes, note))
     result = result_of(model, run, provenance.error_estimate(data))
-    result.meshes = mesh_files.saved_meshes(data)
+    result.meshes = provenance.saved_meshes(data)
     return result

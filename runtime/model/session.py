@@ -22,7 +22,7 @@ from ..engine.looped_engine import LoopedEngine
 from ..integrate.c_loop import Integrator, Samples, Status
 from ..integrate.settings import Settings
 from ..integrate.steppers import AUTO
-from ..result.factory import result_of
+from ..result.one_way.result import result_of
 from ..run import classical_run, external_integrators
 from ..run.integration_run import SLICE, make_run, needs_projection, project_samples, split
 from ..run.measured_quantities import MeasuredOutputs, reject_one_way

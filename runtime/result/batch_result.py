@@ -20,7 +20,7 @@ from ..integrate.c_loop import Statistics, Status
 from ..run.batch_run import BatchData
 from ..run.trajectory import Trajectory
 from .export import xarray_dataset
-from .export.result_files import save_dataset
+from .export.xarray_dataset import save_dataset
 from .plotting.default_quantities import Candidate, default_candidates
 from .plotting.panels import Panel, PlotSelection, Trace, build_panels
 from .quantity_names import Quantity, column_labels

@@ -15,39 +15,29 @@ import numpy as np
 from mstmm.argument_validation import require_word
 from mstmm.array_validation import Array
 from mstmm.errors import SceneError
-from mstmm.scene import Output
+from mstmm.scene import Output, split_reference
 from mstmm.scene.validators.validation_messages import did_you_mean
 
-from ..engine.quantity_registry import (  # fmt: skip
+from ..engine.quantity_registry import (
     BODY_QUANTITIES,
-    POINT_COLUMNS,
+    END_QUANTITIES,
+    FLEXIBLE_QUANTITIES,
+    HINGE_QUANTITIES,
+    MASS_QUANTITIES,
     SUMS,
+    WORK_KIND,
     WXYZ,
-    XYZ,
     QuantityKind,
 )
 from ..packing.coordinate_layout import HingeSlots
-from .flexible.flexible_quantity_names import add_body_quantities
-from .observations import quaternions
-from .quantity_names import Quantity, Table, Values
-from .scene_outputs import component_of, quantity_of, single_quantity_name
-from .sources.applied_loads import AppliedLoads
-from .sources.bushings import add_bushing
-from .sources.constraints import add_constraint, add_coupling
-from .sources.euler_angles import EULER_KIND, euler_angles, gimbal_note
-from .sources.hinges import add_hinge, add_modes
-from .sources.loads import add_load
-from .sources.springs import add_spring
+from .element_quantities import AppliedLoads, ElementValues, element_values
+from .hinge_quantities import HingeValues, add_coordinates
+from .observations import euler_angles, quaternions
+from .quantity_names import Quantity, Table, component_of, quantity_of, single_quantity_name
 
 if TYPE_CHECKING:
     from .flexible.quantities import FlexibleResults
     from .observations import Observations
-
-
-#: Quantities whose time derivatives are quantities too.
-RATE_KINDS = {
-    "position": "velocity", "velocity": "acceleration", "angular_velocity": "angular_acceleration",
-}  # fmt: skip
 
 
 class Quantities:
@@ -64,37 +54,21 @@ class Quantities:
         self._external_names = observed.references.scene.names
         self._orientations: dict[str, Array] = {}
         self._tables: dict[str, Table] = {}
-        #: Functions that add the quantities of other elements and of loops, by name.
-        self._deferred_entries: dict[str, list[Callable[[Table], None]]] = {}
         scene, loop_scene = observed.references.scene, observed.engine.packed.user_scene
-        for spring in scene.spring:
-            self._add_deferred(
-                spring.name, partial(add_spring, acting=self.applied_loads, spring=spring)
-            )
-        for k, load in enumerate(scene.load):
-            self._add_deferred(
-                load.name, partial(add_load, acting=self.applied_loads, load=load, number=k)
-            )
-        for bushing in scene.bushing:
-            self._add_deferred(
-                bushing.name, partial(add_bushing, observed=observed, bushing=bushing)
-            )
-        for constraint in loop_scene.constraint:
-            self._add_deferred(
-                constraint.name, partial(add_constraint, observed=observed, constraint=constraint)
-            )
-        for coupling in loop_scene.coupling:
-            self._add_deferred(
-                coupling.name, partial(add_coupling, observed=observed, name=coupling.name)
-            )
+        #: Springs, loads, bushings and closures of loops by name, which a hinge may share.
+        self._elements: dict[str, list[ElementValues]] = {}
+        for element in element_values(self.applied_loads, scene, loop_scene):
+            self._elements.setdefault(element.name, []).append(element)
 
     # --- bodies ---------------------------------------------------------------------------------
 
     def body_quantity(self, reference: str, kind: str) -> Array:
         """Quantity (n, 3) of a body or end, or (n, 4) for the orientation."""
         points = self.observations.points(reference)
-        if kind != "orientation":
-            return points[:, POINT_COLUMNS[kind]]
+        if BODY_QUANTITIES[kind].part:
+            return points[:, BODY_QUANTITIES[kind].columns]
+        if kind == "euler":
+            return euler_angles(points[:, 15:24])
         if reference not in self._orientations:
             self._orientations[reference] = quaternions(points[:, 15:24])
         return self._orientations[reference]
@@ -121,7 +95,7 @@ class Quantities:
                 "inboard hinge"
             )
         hinge_name = self.slots(hinge).name
-        return self.observations.loads(hinge_name, 0 if kind == "force" else 3)
+        return self.observations.loads(hinge_name, HINGE_QUANTITIES[kind].columns.start)
 
     def effort(self, hinge: str) -> Array:
         """Efforts (n, nu) of laws and drives along the speeds of a hinge."""
@@ -129,11 +103,10 @@ class Quantities:
 
     def sum(self, name: str) -> Array:
         """Sum over the scene, by name: (n,) or (n, 3)."""
-        columns = SUMS[name][2]
-        values = self.observations.part("sums")[:, columns]
+        values = self.observations.part("sums")[:, SUMS[name].columns]
         if name == "energy":
             return np.asarray(values.sum(axis=1))
-        return values[:, 0] if columns.stop - columns.start == 1 else values
+        return values if SUMS[name].labels else values[:, 0]
 
     # --- by name --------------------------------------------------------------------------------
 
@@ -169,10 +142,10 @@ class Quantities:
 
         For a name shared with a hinge or body, those of the hinge or body are elsewhere.
         """
-        for owner in self._deferred_entries:
+        for elements in self._elements.values():
             table = Table({}, [])
-            for add in self._deferred_entries[owner]:
-                add(table)
+            for element in elements:
+                element.add_to(table)
             yield from (table.entries[name]() for name in table.vector_names)
 
     def names(self) -> list[str]:
@@ -200,83 +173,73 @@ class Quantities:
         yield from self.layout.hinges
         yield from self.observations.references
         bodies = (self.layout.hinges, self.observations.references)
-        yield from (
-            name
-            for name in self._deferred_entries
-            if not any(name in bodies_of_kind for bodies_of_kind in bodies)
-        )
+        yield from (name for name in self._elements if not any(name in names for names in bodies))
         yield ""
 
     def table_of(self, owner: str) -> Table:
         """Name table of one owner."""
         if owner not in self._tables:
-            table = Table({}, [])
-            hinges, is_own_name = (
-                self.layout.hinges,
-                self._external_names.hinge.get(owner, owner) == owner,
-            )
+            table, hinges = Table({}, []), self.layout.hinges
+            is_own_name = self._external_names.hinge.get(owner, owner) == owner
             if is_own_name and owner in hinges and owner not in self.layout.modal:
-                add_hinge(table, self.applied_loads, hinges[owner])
+                HingeValues(self.applied_loads, hinges[owner]).add_to(table)
             elif owner in self.observations.references:
-                self._body(table, owner)
+                self._add_body(table, owner)
             elif not owner:
-                self._scene(table)
-            for add in self._deferred_entries.get(owner, ()):
-                add(table)
+                self._add_scene(table)
+            for element in self._elements.get(owner, ()):
+                element.add_to(table)
             self._tables[owner] = table
         return self._tables[owner]
 
     def _is_owner(self, owner: str) -> bool:
-        owner_groups = (self.layout.hinges, self.observations.references, self._deferred_entries)
+        owner_groups = (self.layout.hinges, self.observations.references, self._elements)
         return any(owner in owners for owners in owner_groups)
 
-    def _add_deferred(self, name: str, add: Callable[[Table], None]) -> None:
-        self._deferred_entries.setdefault(name, []).append(add)
+    def _add_body(self, table: Table, reference: str) -> None:
+        for kind in BODY_QUANTITIES.values():
+            get = partial(self.body_quantity, reference, kind.name)
+            rates = partial(self.body_quantity, reference, kind.rates) if kind.rates else None
+            table.add(reference, kind, get, rates, reference)
+        slots = self.layout.modal.get(reference)
+        if slots is not None:
+            owner = f"flexible body {slots.name}"
+            add_coordinates(table, self.applied_loads, slots, owner, modes=True)
+        body, end = split_reference(reference)
+        for kind in self._kinds_with_method(body, end):
+            method = getattr(self._flexible, kind.method or kind.name)
+            get = partial(method, body, end) if end else partial(method, body)
+            table.add(reference, kind, get, owner=reference)
 
-    def _body(self, table: Table, reference: str) -> None:
-        for kind, description in BODY_QUANTITIES.items():
-            rates = RATE_KINDS.get(kind)
-            table.vector(
-                f"{reference}.{kind}",
-                reference,
-                description,
-                self._bound(self.body_quantity, reference, kind),
-                None if rates is None else self._bound(self.body_quantity, reference, rates),
-            )
-        table.vector(
-            f"{reference}.euler", reference, EULER_KIND,
-            lambda: euler_angles(self.observations.points(reference)[:, 15:24]), note=gimbal_note,
-        )  # fmt: skip
-        if reference in self.layout.modal:
-            add_modes(table, self.applied_loads, self.layout.modal[reference])
-        add_body_quantities(table, self._flexible, reference)
+    def _kinds_with_method(self, body: str, end: str) -> Iterator[QuantityKind]:
+        """Kinds of a body or of one of its ends that methods of `Result` compute."""
+        flexible = self._flexible.model.flexible_bodies.get(body)
+        if end:
+            has_axis = flexible is not None and flexible.shapes is not None
+            yield from END_QUANTITIES.values() if has_axis else ()
+            return
+        for kind in MASS_QUANTITIES.values():
+            yield replace(kind, listed=flexible is not None)
+        if flexible is not None:
+            yield replace(FLEXIBLE_QUANTITIES["modal_energy"], labels=flexible.modes)
+            yield FLEXIBLE_QUANTITIES["strain_energy"]
 
-    def _scene(self, table: Table) -> None:
-        for name, (unit, long_name, columns) in SUMS.items():
-            get = self._sum_getter(name)
-            if name == "energy" or columns.stop - columns.start == 1:
-                table.scalar(name, unit, long_name, get)
-            else:
-                table.vector(name, "the scene", QuantityKind(unit, long_name, XYZ, ()), get)
-        work_label = "work of all non-conservative efforts"
-        power = self._sum_getter("power")
-        table.scalar("work", "J", work_label, lambda: self.run.work, rates=power)
+    def _add_scene(self, table: Table) -> None:
+        for name, kind in SUMS.items():
+            owner = "the scene" if kind.labels else ""
+            table.add("", kind, partial(self.sum, name), owner=owner)
+        table.add("", WORK_KIND, lambda: self.run.work, partial(self.sum, WORK_KIND.rates))
         scene = self.observations.references.scene
         for word, channels in (("input", scene.input), ("signal", scene.signal)):
             for channel in channels:
-                table.scalar(
-                    channel.name,
-                    channel.unit,
-                    f"{word} {channel.name}",
-                    self._input_getter(channel.name),
-                )
+                kind = QuantityKind(channel.name, channel.unit, f"{word} {channel.name}")
+                table.add("", kind, partial(self._input, channel.name))
         column = self.observations.engine.packed.system.held_inputs.first
         for controller in scene.controller:
             for k in range(len(controller.A)):
-                name, owner = f"{controller.name}.x[{k}]", f"controller {controller.name}"
-                table.scalar(
-                    name, "", f"state {k}", self._memory_getter(column + 1 + k), owner=owner
-                )
+                kind = QuantityKind(f"x[{k}]", "", f"state {k}")
+                get = partial(self._memory, column + 1 + k)
+                table.add(controller.name, kind, get, owner=f"controller {controller.name}")
             column += 1 + len(controller.A) + len(controller.outputs)
         for output in scene.output:
             self._output(table, output)
@@ -307,20 +270,14 @@ class Quantities:
             table.entries[f"{output.name}.{label}"] = component(label)
         table.scalars += [f"{output.name}.{label}" for label in labels] or [output.name]
 
-    def _sum_getter(self, name: str) -> Values:
-        return lambda: self.sum(name)
-
-    def _input_getter(self, name: str) -> Values:
+    def _input(self, name: str) -> Array:
         packed = self.observations.engine.packed
-        column = packed.system.held_inputs.memory_indices[packed.layout.inputs[name]]
+        number = packed.layout.inputs[name]
+        column = packed.system.held_inputs.memory_indices[number]
         if column >= 0:
-            return lambda: self.run.memory[:, column]
-        channel = packed.system.inputs[packed.layout.inputs[name]]
-        return lambda: np.array([channel.value(t) for t in self.run.t.tolist()])
+            return self._memory(column)
+        channel = packed.system.inputs[number]
+        return np.array([channel.value(t) for t in self.run.t.tolist()])
 
-    def _memory_getter(self, memory_index: int) -> Values:
-        return lambda: self.run.memory[:, memory_index]
-
-    @staticmethod
-    def _bound(method: Callable[[str, str], Array], name: str, kind: str) -> Values:
-        return lambda: method(name, kind)
+    def _memory(self, memory_index: int) -> Array:
+        return self.run.memory[:, memory_index]

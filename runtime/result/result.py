@@ -105,7 +105,7 @@ class Result(PublicMembers, Record, NotebookDisplay):
         when it is complete; then the checkpoint of a run that has ended is removed.
         EnvironmentFailure if the extra is missing or the file cannot be written.
         """
-        from .export.result_files import save_result
+        from .export.xarray_dataset import save_result
 
         saved = save_result(self, require_path("result file", path))
         if self.checkpoint is not None and self.status is not None:
@@ -114,7 +114,7 @@ class Result(PublicMembers, Record, NotebookDisplay):
 
     def table(self, *names: str, rows: int = 12) -> str:
         """Text table of some samples; by default of every hinge coordinate and the energy."""
-        from .export.text_table import text_table
+        from .export.column_files import text_table
 
         return text_table(self, names, rows)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -24,10 +25,12 @@ from ..run.step_stability import StepCheck, check_step
 from ..run.trajectory import MethodSegment, Trajectory
 from .certificate import Certificate
 from .flexible.quantities import FlexibleResults
-from .mesh_files import file_contents
 from .observations import Observations
 from .quantities import Quantities
 from .quantity_names import Quantity
+
+#: Size limit of all stored mesh files of a scene, bytes.
+_MAX_MESH_BYTES = 50_000_000
 
 #: States below this have finite energies in any realistic scene.
 _MAX_SAFE_MAGNITUDE = 1e60
@@ -67,8 +70,26 @@ class Record(FlexibleResults, ABC):
         return (
             type(self),
             (self.model, self.trajectory, self._error),
-            {"meshes": file_contents(self.model.scene, self.meshes)},
+            {"meshes": self.mesh_contents()},
         )
+
+    def mesh_contents(self) -> dict[str, bytes]:
+        """Contents of the mesh files of the scene's shapes by path.
+
+        As stored with the result, else as they are now. Unreadable files are left out; all of them
+        are if they are too large to store.
+        """
+        files = dict(self.meshes)
+        names = {shape.file for shape in self.model.scene.shape if shape.file is not None}
+        present = [path for name in names - set(files) if (path := Path(name)).is_file()]
+        if sum(path.stat().st_size for path in present) > _MAX_MESH_BYTES:
+            return files
+        for path in present:
+            try:
+                files[str(path)] = path.read_bytes()
+            except OSError:
+                continue
+        return files
 
     @property
     def success(self) -> bool:

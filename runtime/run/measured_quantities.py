@@ -20,16 +20,14 @@ from mstmm.scene.validators.validation_messages import did_you_mean
 
 from ..engine.looped_engine import LoopedEngine, Probe
 from ..engine.quantity_registry import (
-    BODY_QUANTITIES,
-    HINGE_QUANTITIES,
-    POINT_COLUMNS,
+    BODY_COMPONENTS,
+    HINGE_COMPONENTS,
     SUMS,
     BodyReferences,
-    acceleration_name,
-    effort_names,
+    components,
+    coordinate_columns,
 )
 from ..kernels.c_records import c_tape
-from ..packing.coordinate_layout import HingeSlots
 from ..packing.expression_tapes import inputs_port, state_ports
 from ..packing.packed_scene import PackedScene, resize_workspace
 
@@ -38,6 +36,9 @@ Slot = tuple[str, int]
 
 #: Ports that need an observation of the state.
 _OBSERVED_PORTS = ("points", "loads", "efforts", "udot", "sums")
+
+#: Sums over the scene that are single columns.
+_SUM_COMPONENTS = components({name: kind for name, kind in SUMS.items() if name != "energy"})
 
 
 class MeasuredQuantities:
@@ -93,7 +94,7 @@ class MeasuredQuantities:
         if name.text == "energy":
             kinetic, gravity, springs = (self._element(("sums", k)) for k in range(3))
             return kinetic + gravity + springs
-        slot = self._scene_slot(name.text) or self._owner_slot(name.text)
+        slot = self._slot(name.text)
         if slot is None:
             raise SceneError(
                 f'"{name.text}": this quantity cannot be measured during a run'
@@ -118,62 +119,41 @@ class MeasuredQuantities:
             self._read.add(slot[0])
         return self._graph.element(*slot)
 
-    def _scene_slot(self, text: str) -> Slot | None:
-        """Slot of a quantity of the whole scene, such as "momentum.x"; None if `text` is none."""
-        for name, (_, _, columns) in SUMS.items():
-            if text == name and columns.stop == columns.start + 1:
-                return "sums", columns.start
-            if columns.stop == columns.start + 3 and text.startswith(f"{name}."):
-                label = text.removeprefix(f"{name}.")
-                if label in ("x", "y", "z"):
-                    return "sums", columns.start + "xyz".index(label)
-        return None
-
-    def _owner_slot(self, text: str) -> Slot | None:
-        """Slot of a quantity of a hinge, a body or an end; None if there is none."""
+    def _slot(self, text: str) -> Slot | None:
+        """Slot of a quantity of the scene, a hinge, a body or an end; None if there is none."""
+        if text in _SUM_COMPONENTS:
+            kind, k = _SUM_COMPONENTS[text]
+            return "sums", kind.columns.start + k
         parts = text.split(".")
-        packed = self._engine.packed
-        for k in range(len(parts) - 1, 0, -1):
-            owner, quantity = ".".join(parts[:k]), ".".join(parts[k:])
-            coordinates = packed.layout.hinges.get(owner) or packed.layout.modal.get(owner)
-            slot = None if coordinates is None else self._hinge_slot(coordinates, owner, quantity)
-            reference = self._references.canonical(owner)
-            if slot is None and reference is not None:
-                slot = self._end_slot(reference, quantity)
+        for count in range(len(parts) - 1, 0, -1):
+            owner, quantity = ".".join(parts[:count]), ".".join(parts[count:])
+            slot = self._hinge_slot(owner, quantity) or self._end_slot(owner, quantity)
             if slot is not None:
                 return slot
         return None
 
-    def _hinge_slot(self, coordinates: HingeSlots, owner: str, quantity: str) -> Slot | None:
-        q, u, u_names = coordinates.q, coordinates.u, coordinates.u_names
-        groups = [("q", "q", q, coordinates.q_names), ("u", "u", u, u_names)]
-        groups.append(("udot", "udot", u, tuple(acceleration_name(name) for name in u_names)))
-        is_modal = owner in self._engine.packed.layout.modal
-        if not is_modal:
-            groups.append(("efforts", "effort", u, tuple(effort_names(u_names))))
-        for port, short, first, names in groups:
-            aliases = [*names, *(f"{short}[{k}]" for k in range(len(names)))]
-            aliases += [short] if len(names) == 1 else []
-            if quantity in aliases:
-                return port, first + aliases.index(quantity) % len(names)
-        if is_modal:
+    def _hinge_slot(self, owner: str, quantity: str) -> Slot | None:
+        packed = self._engine.packed
+        slots = packed.layout.hinges.get(owner) or packed.layout.modal.get(owner)
+        if slots is None:
             return None
-        body = self._engine.packed.hinge_position[owner]
-        for block, (kind, description) in enumerate(HINGE_QUANTITIES.items()):
-            for axis, label in enumerate(description.labels):
-                if quantity in (f"{kind}.{label}", description.short[axis]):
-                    return "loads", 6 * body + 3 * block + axis
-        return None
+        is_modal = owner in packed.layout.modal
+        for column in coordinate_columns(slots, efforts=not is_modal):
+            if quantity in column.names:
+                return column.part, column.index
+        kind, k = HINGE_COMPONENTS.get(quantity, (None, 0))
+        if kind is None or not kind.part or is_modal:
+            return None
+        return kind.part, 6 * packed.hinge_position[owner] + kind.columns.start + k
 
-    def _end_slot(self, reference: str, quantity: str) -> Slot | None:
-        for kind, columns in POINT_COLUMNS.items():
-            description = BODY_QUANTITIES[kind]
-            for axis, label in enumerate(description.labels):
-                if quantity in (f"{kind}.{label}", description.short[axis]):
-                    probe = self._probes.setdefault(reference, len(self._probes))
-                    width = int(self._engine.lib.MSTMM_PROBE_NUMBERS)
-                    return "points", width * probe + columns.start + axis
-        return None
+    def _end_slot(self, owner: str, quantity: str) -> Slot | None:
+        reference = self._references.canonical(owner)
+        kind, k = BODY_COMPONENTS.get(quantity, (None, 0))
+        if reference is None or kind is None or not kind.part:
+            return None
+        probe = self._probes.setdefault(reference, len(self._probes))
+        width = int(self._engine.lib.MSTMM_PROBE_NUMBERS)
+        return kind.part, width * probe + kind.columns.start + k
 
     def evaluate(self, run: Any, t: float, y: Array) -> Array:
         """Values (numbers,) at time t (s) and state y (n_state,); `run` is a `mstmm_scene_run *`.

@@ -23,7 +23,7 @@ from ...integrate.achieved_error import AchievedError, ErrorControlRun
 from ...integrate.settings import Settings
 from ...integrate.steppers import AUTO
 from ...platform_support.interrupts import Interrupt, record_interrupts
-from ...result.factory import result_of
+from ...result.one_way.result import result_of
 from ...run.error_estimate import compare
 from ...run.run_execution import RunMonitor, first_run, return_start_cache, take_start_cache
 from ..error_measure import Coordinates, Measure, Quantities

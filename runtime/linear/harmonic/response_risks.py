@@ -19,7 +19,7 @@ from ...result.flexible.missing_shapes import unshaped_directions
 from ..input_channels import Channel
 from ..operating_point.departure import MATRICES, find_changes, find_departure
 from ..operating_point.later_states import LaterStates
-from ..outputs.output_rows import LinearQuantity
+from ..outputs import LinearQuantity
 from ..validity import changing_risk
 
 if TYPE_CHECKING:

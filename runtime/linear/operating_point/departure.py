@@ -15,8 +15,7 @@ from mstmm.errors import NumericalFailure
 from ...engine.compiled_scene import scene_length, speed_scales, total_weight
 from ..harmonic.harmonic_solve import HarmonicLoads
 from ..input_channels import Channel
-from ..outputs.linear_outputs import outputs_of, rows_of
-from ..outputs.output_rows import LinearQuantity
+from ..outputs import LinearQuantity, outputs_of, rows_of
 from .later_states import LaterStates
 
 if TYPE_CHECKING:

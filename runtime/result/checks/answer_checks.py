@@ -18,7 +18,7 @@ from mstmm.risk import ON_RISK, Risk
 
 from ...integrate.settings import Settings
 from ...run.step_stability import check_step
-from ..factory import result_of
+from ..one_way.result import result_of
 from .check import RunStart, risks_of
 from .run_checks import PreRunFindings, check_before_run
 

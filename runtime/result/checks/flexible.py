@@ -19,10 +19,10 @@ from mstmm.array_validation import Array
 from mstmm.risk import Risk
 
 from ...discontinuities.cell_subdivision import MAX_STEP_ANGLE
-from ..flexible.body_motions import FlexibleBodies
-from ..flexible.modal_energy import modal_frequencies, modal_mass
 from ..flexible.model_range import ModelRange, model_ranges
+from ..flexible.momentum import modal_frequencies, modal_mass
 from ..flexible.range_estimators import BENDING_ENERGY, has_second_order_terms, transverse_spin
+from ..flexible.section_loads import FlexibleBodies
 from ..observations import Observations
 from .check import Check, MeasuringCheck, RunStart
 

@@ -16,7 +16,7 @@ from ...engine.loops.loop_calls import LoopCalls
 from ...integrate.steppers import INDEX3_SUFFIX
 from ...packing.system_variants import LOCKING_GAP_FRACTION, characteristic_length
 from ..certificate_data import Closure
-from ..sources.contacts import find_pulling_contacts
+from ..element_checks import find_pulling_contacts
 from .check import Check, MeasuringCheck, RunStart
 
 if TYPE_CHECKING:

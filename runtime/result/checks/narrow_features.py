@@ -36,7 +36,7 @@ from ...discontinuities.cell_subdivision import (
 )
 from ...discontinuities.interval_enclosures import TIME, Enclosure, Interval
 from ...run.run_execution import RunMonitor, first_run
-from ..sources.paths import RunStates, SampledVariable, make_enclosures, sampled_variables
+from ..expression_variables import RunStates, SampledVariable, make_enclosures, sampled_variables
 from .check import Check
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from ...run.error_estimate import ErrorEstimate
 from ...run.step_stability import StepCheck, check_later
 from ..certificate import Certificate
 from ..certificate_data import MAX_CHECKED_BODIES
-from ..spring_deflection import stiffest_spring_deflection
+from ..element_checks import stiffest_spring_deflection
 from .check import Check, MeasuringCheck, RunStart, risks_of
 from .conditioning import PIVOT_LOSS, SINGULARITY
 from .conservation import BALANCE, step_control

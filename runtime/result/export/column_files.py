@@ -1,26 +1,153 @@
-"""CSV and MATLAB files of columns over time, without the scene."""
+"""CSV and MATLAB files of columns over time, without the scene, and text tables."""
 
 from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mstmm.argument_validation import parse_number, require_path
-from mstmm.array_validation import Array, Integers
+from mstmm.array_validation import Array, Integers, integer
 from mstmm.errors import SceneError
 from mstmm.scene.validators.validation_messages import did_you_mean
 
-from ...engine.quantity_registry import BODY_QUANTITIES, HINGE_QUANTITIES, WXYZ, XYZ
-from ..plotting.default_quantities import Candidate, rate_candidates
+from ...engine.quantity_registry import BODY_QUANTITIES, EULER_KIND, HINGE_QUANTITIES, WXYZ, XYZ
+from ...platform_support.safe_files import replace_atomically
+from ..plotting.default_quantities import Candidate, choose_panels, rate_candidates
 from ..quantity_names import Quantity
-from ..sources.euler_angles import EULER_KIND
-from .csv_and_mat import TABLES, write_table
+
+if TYPE_CHECKING:
+    from ..plotting.default_quantities import PlotSource
+    from ..quantity_names import Quantity
+
+
+def write_table(
+    t: Array, event: Integers, quantities: Sequence[Quantity], path: Path, scene: str = ""
+) -> Path:
+    """Write scalar quantities and events (n,) at the times t (n,) s; the suffix is in `TABLES`."""
+    with replace_atomically(path) as temporary:
+        TABLES[path.suffix.lower()](t, event, quantities, temporary, scene)
+    return path
+
+
+def column_heading(quantity: Quantity) -> str:
+    """Heading of a column: name and unit."""
+    return f"{quantity.name} [{quantity.unit}]" if quantity.unit else quantity.name
+
+
+def matlab_names(names: Sequence[str]) -> list[str]:
+    """Unique names valid in MATLAB: letters, digits and _, at most 63 characters."""
+    taken, result = {"t", "event", "names", "scene"}, []
+    for name in names:
+        text = re.sub(r"\W", "_", name)
+        text = (text if text[:1].isalpha() else f"x{text}")[:63]
+        number = 1
+        while text in taken:
+            number += 1
+            end = f"_{number}"
+            text = text[: 63 - len(end)] + end
+        taken.add(text)
+        result.append(text)
+    return result
+
+
+def _write_csv(
+    t: Array, event: Integers, quantities: Sequence[Quantity], path: Path, _: str
+) -> None:
+    """One row per sample, one column per scalar; the header holds names and units."""
+    header = ["time [s]", "event", *map(column_heading, quantities)]
+    columns = [t.tolist(), event.tolist(), *(q.values.tolist() for q in quantities)]
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(header)
+        writer.writerows(zip(*columns, strict=True))
+
+
+def _write_mat(
+    t: Array, event: Integers, quantities: Sequence[Quantity], path: Path, scene: str
+) -> None:
+    """One variable per scalar; `names` has a row for each: MATLAB's name, original name, unit."""
+    from scipy.io import savemat
+
+    keys = matlab_names([quantity.name for quantity in quantities])
+    rows = [
+        (key, quantity.name, quantity.unit) for key, quantity in zip(keys, quantities, strict=True)
+    ]
+    names = np.array(rows, dtype=object).reshape(-1, 3)
+    data: dict[str, Any] = {
+        key: quantity.values[:, None] for key, quantity in zip(keys, quantities, strict=True)
+    }
+    data |= {"t": t[:, None], "event": event[:, None], "names": names, "scene": scene}
+    with path.open("wb") as file:
+        savemat(file, data, long_field_names=True, do_compression=True)
+
+
+#: Writers by file suffix.
+TABLES: dict[str, Callable[[Array, Integers, Sequence[Quantity], Path, str], None]] = {
+    ".csv": _write_csv, ".mat": _write_mat,
+}  # fmt: skip
+
+
+#: Default number of columns of a table.
+_DEFAULT_COLUMNS = 6
+
+
+def default_names(result: PlotSource, most: int = _DEFAULT_COLUMNS) -> list[str]:
+    """Names of the default quantities of `plot`, one for each column."""
+    return [name for chosen in choose_panels(result, most) for name in chosen.names][:most]
+
+
+def flat_columns(quantities: Sequence[Quantity]) -> list[tuple[str, str, np.ndarray]]:
+    """Name, unit and values (n,) of every column."""
+    columns = []
+    for quantity in quantities:
+        if quantity.values.ndim == 1:
+            columns.append((quantity.name, quantity.unit, quantity.values))
+            continue
+        for k, label in enumerate(quantity.labels):
+            columns.append((f"{quantity.name}.{label}", quantity.unit, quantity.values[:, k]))
+    return columns
+
+
+def text_table(
+    result: PlotSource, names: Sequence[str], rows: int, beside: Sequence[str] = ("energy",)
+) -> str:
+    """Aligned columns with a line of units; `rows` samples spread evenly over time.
+
+    Without names, default quantities are chosen, followed by the names in `beside`.
+    """
+    selected = list(names) or [*default_names(result), *beside]
+    columns = [("t", "s", result.t), *flat_columns([result.quantity(name) for name in selected])]
+    samples = _evenly_spaced_samples(
+        result.t, integer("rows", rows, 2, "a whole number of rows, 2 or more")
+    )
+    texts = [
+        [name, f"[{unit}]" if unit else "", *(f"{value:.6g}" for value in values[samples])]
+        for name, unit, values in columns
+    ]
+    widths = [max(map(len, column)) for column in texts]
+    lines = [
+        "  ".join(entry.rjust(width) for entry, width in zip(row, widths, strict=True)).rstrip()
+        for row in zip(*texts, strict=True)
+    ]
+    rule = "  ".join("-" * width for width in widths)
+    return "\n".join([*lines[:2], rule, *lines[2:]])
+
+
+def _evenly_spaced_samples(t: np.ndarray, rows: int) -> list[int]:
+    """Samples next to `rows` evenly spaced times, including the first and last."""
+    if len(t) <= rows:
+        return list(range(len(t)))
+    targets = np.linspace(t[0], t[-1], max(2, rows))
+    right = np.clip(np.searchsorted(t, targets), 1, len(t) - 1)
+    nearest = np.where(targets - t[right - 1] < t[right] - targets, right - 1, right)
+    return sorted({*nearest.tolist(), len(t) - 1})
+
 
 #: "shoulder.angle [rad]", "rod.qw".
 _HEADING_PATTERN = re.compile(r"(.*?)(?: \[(.*)\])?")
@@ -32,7 +159,7 @@ _RATE_SUFFIXES = {"x": "vx", "y": "vy", "z": "vz", "vx": "ax", "vy": "ay", "vz":
 
 
 #: Vectors whose components have short names, such as rod1.tip.vx.
-_VECTOR_KINDS = {**BODY_QUANTITIES, **HINGE_QUANTITIES, "euler": EULER_KIND}
+_VECTOR_KINDS = {**BODY_QUANTITIES, **HINGE_QUANTITIES}
 
 
 class _NotInColumnsError(SceneError, AttributeError):
@@ -75,7 +202,7 @@ class ColumnFile:
         candidates = [
             (x, tuple(f"{name}.{label}" for label in x)) for x in (XYZ, WXYZ, EULER_KIND.labels)
         ]
-        if kind_description is not None:
+        if kind_description is not None and kind_description.short:
             candidates.append(
                 (
                     kind_description.labels,
@@ -101,8 +228,6 @@ class ColumnFile:
 
     def table(self, *names: str, rows: int = 12) -> str:
         """Text table of some samples, as `Result.table`."""
-        from .text_table import text_table
-
         return text_table(self, names, rows, sorted({"energy"} & self._columns.keys()))
 
     def plot(self, *names: str, **options: Any) -> Any:

@@ -1,10 +1,11 @@
-"""Provenance of a result: scene, settings, versions, kernels; to attributes and back."""
+"""Provenance of a result: scene, settings, versions, kernels, mesh files; and back."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 import platform
+from collections.abc import Mapping
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
@@ -223,3 +224,22 @@ def read_trajectory(data: Any) -> Trajectory:
         from_rows(json.loads(a.get("methods", "[]"))),
         from_dict(json.loads(a.get("error_estimate", "null"))), bool(a.get("told", 1)),
     )  # fmt: skip
+
+
+_EncodedVariable = tuple[tuple[str, ...], Any, dict[str, str], dict[str, Any]]
+
+
+def mesh_variables(result: Record) -> dict[str, _EncodedVariable]:
+    """Dataset variables of mesh files: bytes, and the path as an attribute."""
+    rows: dict[str, _EncodedVariable] = {}
+    for k, (path, content) in enumerate(sorted(result.mesh_contents().items())):
+        attributes = {"long_name": "file of a mesh that shapes are drawn by", "path": path}
+        values = np.frombuffer(content, dtype=np.uint8)
+        rows[f"mesh_{k}"] = ((f"mesh_{k}_byte",), values, attributes, {"zlib": True})
+    return rows
+
+
+def saved_meshes(data: Any) -> Mapping[str, bytes]:
+    """Contents of the mesh files of a saved result by their paths in its scene."""
+    names = [name for name in data if str(name).startswith("mesh_") and "path" in data[name].attrs]
+    return {str(data[n].attrs["path"]): data[n].values.astype(np.uint8).tobytes() for n in names}

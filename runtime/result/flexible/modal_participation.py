@@ -20,7 +20,7 @@ from mstmm.scene import split_reference
 
 if TYPE_CHECKING:
     from ...engine.compiled_scene import CompiledScene
-    from .body_motions import FlexibleBodies
+    from .section_loads import FlexibleBodies
 
 
 #: Largest number of speeds for which the mass matrix is formed here.

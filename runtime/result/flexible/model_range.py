@@ -22,14 +22,14 @@ from .missing_shapes import (
     quadrature_rule,
     unshaped_deformation,
 )
-from .modal_energy import modal_energy, modal_frequencies, strain_energy
 from .modal_participation import participation_by_body
+from .momentum import modal_energy, modal_frequencies, strain_energy
 from .motion import elastic_moment, tilde
 from .section_loads import section_loads
 
 if TYPE_CHECKING:
-    from .body_motions import FlexibleBodies
     from .motion import Motion
+    from .section_loads import FlexibleBodies
 
 
 #: Largest numbers of samples and of flexible bodies that are examined.

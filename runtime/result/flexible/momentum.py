@@ -1,4 +1,4 @@
-"""Momentum of bodies, and rigid-body equivalent velocities.
+"""Momentum of bodies, rigid-body equivalent velocities, and energies by modes.
 
 V_RB = p / m and w_RB = I_G^-1 L_G: velocity and spin of the undeformed body in a rigid motion with
 the same momentum p and angular momentum L_G about the mass centre. For any choice of the floating
@@ -16,20 +16,63 @@ import numpy as np
 from mstmm.array_validation import Array
 from mstmm.errors import SceneError
 
+from ...engine.looped_engine import symmetric_matrices
 from ...flexible.modal_body import kernel, moment_inputs
 from ...kernels.numpy_kernels import evaluate
-from .motion import tilde
+from .motion import Motion, tilde
 
 if TYPE_CHECKING:
     from ...flexible.modal_body import ModalBody
-    from .body_motions import FlexibleBodies
     from .motion import Motion
+    from .section_loads import FlexibleBodies
+
+
+def modal_mass(body: ModalBody) -> Array:
+    """Modal mass matrix (n, n), int rho phi . phi in kg; for mass points, their sum."""
+    if not body.points:
+        return np.einsum("aakl->kl", body.F)
+    total = np.zeros_like(body.K)
+    for point in body.points:
+        phi, theta = point.port.phi, point.port.theta
+        total += point.mass * phi.T @ phi + theta.T @ point.inertia @ theta
+    return total
+
+
+def strain_shares(motion: Motion) -> Array:
+    """Strain energy (n, modes) in J by mode, 1/2 eta_k (K eta)_k; the sum is the strain energy."""
+    return 0.5 * motion.eta * (motion.eta @ motion.body.K)
+
+
+def modal_energy(motion: Motion) -> Array:
+    """Energy (n, modes) in J by mode: strain energy plus kinetic energy in the floating frame.
+
+    1/2 eta_k (K eta)_k + 1/2 etad_k (M etad)_k.
+    """
+    kinetic = 0.5 * motion.etad * (motion.etad @ modal_mass(motion.body))
+    return strain_shares(motion) + kinetic
+
+
+def strain_energy(motion: Motion) -> Array:
+    """Strain energy (n,) in J, 1/2 eta^T K eta."""
+    return strain_shares(motion).sum(axis=1)
+
+
+def modal_frequencies(body: ModalBody) -> Array:
+    """Modal frequencies (n,) in rad/s with a fixed floating frame, ascending.
+
+    Zeros where the modal mass cannot be distinguished from rounding.
+    """
+    try:
+        lower = np.linalg.cholesky(modal_mass(body))
+        half = np.linalg.solve(lower, body.K)
+        squares = np.linalg.eigvalsh(np.linalg.solve(lower, half.T))
+    except np.linalg.LinAlgError:
+        squares = np.zeros(body.n)
+    return np.sqrt(np.maximum(squares, 0.0))
 
 
 #: Moments of inertia below this part of the largest count as zero.
 _ZERO_INERTIA_RATIO = 1e-12
-
-_UPPER_TRIANGLE = np.triu_indices(6)
 
 
 @dataclass(frozen=True)
@@ -84,15 +127,10 @@ class Momenta:
 
         Evaluated by the kernel from which the engine obtains them.
         """
-        packed = self.observations.unmerged_observations.engine.packed
-        body_index, axes, offset = packed.end(name)
-        body, ffi, numbers = packed.system.body(body_index), packed.ffi, np.zeros(21)
-        kernel_pointer = packed.elements[body.body].functions["inertia"]
-        inertia = ffi.cast("void (*)(const double *, double *)", kernel_pointer)
-        inertia([*body.body_p, *body.body_frame], ffi.from_buffer("double[]", numbers))
-        matrix = np.zeros((6, 6))
-        matrix[_UPPER_TRIANGLE] = numbers
-        matrix = matrix + np.triu(matrix, 1).T
+        engine = self.observations.unmerged_observations.engine
+        body_index, axes, offset = engine.packed.end(name)
+        body = engine.packed.system.body(body_index)
+        matrix = engine.inertia_matrix(body.body, (*body.body_p, *body.body_frame))
         mass = float(matrix[0, 0])
         if not mass > 0:
             raise SceneError(f'"{name}": a body without mass has no equivalent velocity')
@@ -192,13 +230,6 @@ def frame_momentum(motion: Motion) -> tuple[Array, Array, Array]:
         outputs = evaluate(kernel("momentum"), inputs, body.n)
         parts.append(np.concatenate([outputs["h"], outputs["S"]], axis=1))
     sums = np.concatenate(parts) if parts else np.zeros((0, 27))
-    inertia = _inertia_from_upper(sums[:, 6:])
+    inertia = symmetric_matrices(sums[:, 6:])
     moment = np.stack([inertia[:, 5, 1], inertia[:, 3, 2], inertia[:, 4, 0]], axis=1)
     return sums[:, :3], sums[:, 3:6], moment
-
-
-def _inertia_from_upper(upper: Array) -> Array:
-    """Symmetric matrices (n, 6, 6) from their upper triangles (n, 21), row by row."""
-    full = np.zeros((len(upper), 6, 6))
-    full[:, *np.triu_indices(6)] = upper
-    return full + np.swapaxes(np.triu(full, 1), 1, 2)

@@ -8,7 +8,7 @@ eta in the floating frame and rotated by exp(Psi~), Psi = theta eta - 1/2 eta^T 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from ...flexible.beam.section_ports import BeamShapes
     from ...flexible.beam.shape_fields import ShapeValues
     from ...flexible.modal_body import ModalBody
-
 
 #: Relative length by which a section may exceed the ends: rounding of the user's numbers.
 _LENGTH_TOLERANCE = 1e-9
@@ -54,11 +53,20 @@ class Motion:
     acceleration: Array
     angular_acceleration: Array
 
+    @classmethod
+    def of_points(
+        cls, body: ModalBody, t: Array, modal: tuple[Array, Array, Array], points: Array
+    ) -> Motion:
+        """Motion from (eta, etad, etadd) and the motion (n, 24) of the frame, see `Observation`."""
+        return cls(
+            body, t, *modal, points[:, 0:3], points[:, 15:24].reshape(-1, 3, 3), points[:, 3:6],
+            points[:, 9:12], points[:, 6:9], points[:, 12:15],
+        )  # fmt: skip
+
     def select_samples(self, samples: Any) -> Motion:
         """Motion at some of the samples: a slice or indices."""
-        arrays = {k: v[samples] for k, v in vars(self).items() if isinstance(v, np.ndarray)}
-        sampled = {name: arrays[name] for name in _ARRAYS}
-        return Motion(self.body, **sampled)
+        arrays = {f.name: getattr(self, f.name)[samples] for f in fields(self) if f.name != "body"}
+        return Motion(self.body, **arrays)
 
     @property
     def shapes(self) -> BeamShapes:
@@ -94,12 +102,6 @@ class Motion:
     def frame_angular_acceleration(self) -> Array:
         """Angular acceleration (n, 3) in rad/s2 of the frame, frame axes."""
         return self.inward(self.angular_acceleration)
-
-
-_ARRAYS = (
-    "t", "eta", "etad", "etadd", "position", "rotation", "velocity", "angular_velocity",
-    "acceleration", "angular_acceleration",
-)  # fmt: skip
 
 
 # --- sections along a beam ------------------------------------------------------------------------

@@ -11,11 +11,10 @@ from numpy.typing import ArrayLike
 from mstmm.array_validation import Array
 from mstmm.errors import SceneError
 
-from . import modal_energy as observe_energy
+from . import momentum
 from . import motion as observe
-from .body_motions import FlexibleBodies
 from .momentum import Momenta
-from .section_loads import section_loads
+from .section_loads import FlexibleBodies, section_loads
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -151,11 +150,11 @@ class FlexibleResults:
 
         1/2 eta_k (K eta)_k + 1/2 etad_k (M etad)_k.
         """
-        return observe_energy.modal_energy(self._flexible.motion(body, "modal_energy"))
+        return momentum.modal_energy(self._flexible.motion(body, "modal_energy"))
 
     def strain_energy(self, body: str) -> Array:
         """Strain energy (n,) in J."""
-        return observe_energy.strain_energy(self._flexible.motion(body, "strain_energy"))
+        return momentum.strain_energy(self._flexible.motion(body, "strain_energy"))
 
     # --- of any body ----------------------------------------------------------------------------
 

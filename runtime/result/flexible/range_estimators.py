@@ -16,7 +16,7 @@ import numpy as np
 from mstmm.array_validation import Array
 
 from ...flexible.beam.beam_integrals import second_moments
-from .modal_energy import modal_energy
+from .momentum import modal_energy
 from .motion import Motion, rotation_vectors, tilde, values_at
 
 if TYPE_CHECKING:

@@ -11,8 +11,8 @@ import numpy as np
 
 from mstmm.array_validation import Array
 
+from ...engine.quantity_registry import EULER_KIND
 from ..quantity_names import Quantity, column_labels
-from ..sources.euler_angles import EULER_KIND
 
 if TYPE_CHECKING:
     from ...packing.coordinate_layout import HingeSlots

@@ -11,9 +11,9 @@ import numpy as np
 from mstmm.array_validation import Array
 from mstmm.scene import Load, split_reference
 
+from ..element_quantities import AppliedLoads as Values
+from ..element_quantities import inertial_components
 from ..flexible import motion as observed
-from ..sources.applied_loads import AppliedLoads as Values
-from ..sources.loads import inertial_components
 from .frame_times import FrameTimes
 from .geometry import motion_at
 from .scene_graph import DeformingSurface, ObjectLabel, Poses, SceneGraph, Solid

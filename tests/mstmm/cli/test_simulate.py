@@ -332,7 +332,7 @@ def test_disk_too_full_for_netcdf(
         free = 1000
 
     monkeypatch.setattr(
-        "mstmm.runtime.result.export.result_files.shutil.disk_usage", lambda path: Usage
+        "mstmm.runtime.result.export.xarray_dataset.shutil.disk_usage", lambda path: Usage
     )
     done = mstmm("simulate", "pendulum.toml", "--t-end", "0.1")
     assert done.code == 3 and "MB left" in done.err

@@ -31,7 +31,7 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM)
 #: Files whose lines are counted.
 TRACED_FILES = (
     "simulate/command.py", "simulate/resumable_run.py", "checkpoint.py", "run_execution.py",
-    "safe_files.py", "file_lock.py", "result_files.py",
+    "safe_files.py", "file_lock.py", "xarray_dataset.py",
 )  # fmt: skip
 
 

@@ -21,7 +21,7 @@ from mstmm.runtime.experiments import run_results
 from mstmm.runtime.integrate.c_loop import Status
 from mstmm.runtime.platform_support import interrupts
 from mstmm.runtime.platform_support.safe_files import replace_atomically
-from mstmm.runtime.result.export import csv_and_mat
+from mstmm.runtime.result.export import column_files
 from mstmm.runtime.run import integration_run, run_execution
 from tests.support.commands import Command
 from tests.support.scenes.chart import pendulum
@@ -52,7 +52,7 @@ def test_a_result_that_cannot_be_saved(
         raise error
 
     with monkeypatch.context() as patch:
-        patch.setitem(csv_and_mat.TABLES, ".csv", fail)
+        patch.setitem(column_files.TABLES, ".csv", fail)
         done = mstmm(*RUN, *options)
     assert done.code == code and said in done.err and KEPT in done.err
     assert {path.name for path in folder.iterdir()} == {"pendulum.toml", "a.csv.checkpoint"}

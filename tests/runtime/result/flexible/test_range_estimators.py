@@ -14,13 +14,9 @@ import pytest
 from mstmm.risk import Risk
 from mstmm.runtime.result.checks.flexible import FLEXIBILITY_CHECKS, MODEL_RANGE
 from mstmm.runtime.result.flexible import model_range, range_estimators
-from mstmm.runtime.result.flexible.modal_energy import (
-    modal_energy,
-    modal_frequencies,
-    strain_energy,
-)
 from mstmm.runtime.result.flexible.modal_participation import participation
 from mstmm.runtime.result.flexible.model_range import ModelRange, missed_bending_energy
+from mstmm.runtime.result.flexible.momentum import modal_energy, modal_frequencies, strain_energy
 from tests.support.flexible.beam_motions import (
     EI_Y,
     EI_Z,

@@ -14,8 +14,13 @@ from scipy.integrate import solve_ivp
 import mstmm
 from mstmm.errors import SceneError
 from mstmm.runtime.result.observations import Observations
-from mstmm.runtime.result.one_way.oscillators import Cells, Oscillators
-from mstmm.runtime.result.one_way.response import Response, modal_loads, rigidified_bodies
+from mstmm.runtime.result.one_way.response import (
+    Cells,
+    Oscillators,
+    Response,
+    modal_loads,
+    rigidified_bodies,
+)
 from mstmm.runtime.result.one_way.result import OneWayResult
 from tests.support.flexible.rigid_shapes import rigid_shapes
 from tests.support.scenes import elastic_bar as bar

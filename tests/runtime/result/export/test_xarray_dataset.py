@@ -16,11 +16,10 @@ import xarray
 from scipy.io import loadmat, savemat
 
 import mstmm
-from mstmm.runtime.result.export.column_files import ColumnFile
-from mstmm.runtime.result.export.csv_and_mat import matlab_names
+from mstmm.runtime.result.export.column_files import ColumnFile, matlab_names
 from mstmm.runtime.result.result import Result
 from tests.support.scenes.linkages import four_bar
-from tests.support.scenes.results import motor, pins, tree
+from tests.support.scenes.results import GRAVITY, motor, pins, rod, tree
 
 
 @pytest.fixture(scope="module")
@@ -40,6 +39,17 @@ def test_netcdf_brings_everything_back(run: Result, tmp_path: Path) -> None:
     for ours, theirs in zip(again.last_state, run.last_state, strict=True):
         np.testing.assert_array_equal(ours, theirs)
     assert [p.name for p in tmp_path.iterdir()] == ["run.nc"]
+
+
+def test_a_hinge_may_share_the_name_of_its_body() -> None:
+    hinge = {"name": "rod", "type": "pin", "inboard": "ground", "outboard": "rod"}
+    data = (
+        mstmm.compile(mstmm.Scene(gravity=GRAVITY, body=[rod("rod")], hinge=[hinge]))
+        .simulate(0.01)
+        .to_xarray()
+    )
+    assert [*data["hinge"].values] == ["rod"] and [*data["body"].values] == ["rod", "rod.tip"]
+    assert data["euler"].dims == ("time", "body", "angle")
 
 
 def test_files_without_a_place_for_near_singular_poses(tmp_path: Path) -> None:

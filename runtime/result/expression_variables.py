@@ -11,14 +11,13 @@ import numpy as np
 from mstmm.array_validation import Array, Integers
 from mstmm.expression.expression import Name
 
-from ...discontinuities.active_expressions import ActiveExpression
-from ...discontinuities.interval_enclosures import TIME, Enclosure, Interval
-from ...engine.looped_engine import Probe
+from ..discontinuities.active_expressions import ActiveExpression
+from ..discontinuities.interval_enclosures import TIME, Enclosure, Interval
 
 if TYPE_CHECKING:
-    from mstmm.scene import Hinge
+    from mstmm.scene import Hinge, Spring
 
-    from ...engine.compiled_scene import CompiledScene
+    from ..engine.compiled_scene import CompiledScene
 
 #: A cubic with slopes r at the ends of h deviates from its chord by max |r - chord| h / 4, and its
 #: slope exceeds those three by half their spread; the rest is a margin for higher orders.
@@ -48,7 +47,8 @@ def sampled_variables(
 ) -> dict[str, SampledVariable] | None:
     """Variables of an expression along a run, by name; None if one of them is unknown."""
     constants = dict(active.constants)
-    length = None if active.spring is None else _spring_length(model, states, active)
+    spring = active.spring
+    length = None if spring is None else _spring_length(model, states, spring)
     variables = dict[str, SampledVariable]()
     for name in active.expression.names:
         if name.text in constants or (own is not None and name.text in own.parameters):
@@ -105,25 +105,11 @@ def _sampled_input(model: CompiledScene, states: RunStates, name: str) -> Sample
     return _with_parabola_rates(states.t, np.array([channel.value(t) for t in states.t.tolist()]))
 
 
-def _spring_length(
-    model: CompiledScene, states: RunStates, active: ActiveExpression
-) -> SampledVariable:
-    """Length of the spring of an expression (m) and its rate (m/s)."""
-    engine, spring = model.looped, active.spring
-    assert spring is not None
-    probes = []
-    for reference in (spring.from_, spring.to):
-        body, axes, offset = engine.packed.end(reference)
-        probes.append(Probe(body, axes, spring.position if body < 0 else offset))
-    observation = engine.observe(
-        states.t, states.q.copy(), states.u.copy(), states.memory.copy(), probes, parts=("points",)
-    )
-    difference = observation.points[:, 1, 0:3] - observation.points[:, 0, 0:3]
-    relative_velocity = observation.points[:, 1, 3:6] - observation.points[:, 0, 3:6]
-    length = np.linalg.norm(difference, axis=1)
-    return SampledVariable(
-        length, (difference * relative_velocity).sum(axis=1) / np.where(length > 0, length, 1.0)
-    )
+def _spring_length(model: CompiledScene, states: RunStates, spring: Spring) -> SampledVariable:
+    """Length of a spring (m) and its rate (m/s), 0 where its ends coincide."""
+    arrays = (np.ascontiguousarray(x) for x in (states.t, states.q, states.u, states.memory))
+    length, rate = model.looped.spring_motion(spring, *arrays)
+    return SampledVariable(length, np.where(length > 0, rate, 0.0))
 
 
 def make_enclosures(

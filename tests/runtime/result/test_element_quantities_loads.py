@@ -9,8 +9,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import mstmm
+from mstmm.runtime.result.observations import euler_angles, gimbal_note
 from mstmm.runtime.result.result import Result
-from mstmm.runtime.result.sources.euler_angles import euler_angles, gimbal_note
 from tests.support.scenes.results import rod, tree
 
 

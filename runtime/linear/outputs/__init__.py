@@ -1,1 +1,0 @@
-"""Outputs of linear models as rows of their coordinates."""
