@@ -16,7 +16,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from scipy.linalg import expm
 
 from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure
@@ -156,6 +155,8 @@ class FrameTransform:
 
     def advance(self, dt: float) -> FrameTransform:
         """Transformation dt (s) later."""
+        from scipy.linalg import expm  # here, because a run without linear model needs no SciPy
+
         return FrameTransform(self.rotation @ expm(self.rates * dt), self.rates)
 
     def matrices(self, given: Matrices) -> Matrices:
