@@ -101,23 +101,12 @@ def provenance_variables(result: Record) -> dict[str, Variable]:
     if run.last_state is not None:
         description = {"units": "s", "long_name": "time of the last good state"}
         file_variables["last_t"] = ((), run.last_state[0], description)
-        file_variables["last_q"] = (
-            ("coordinate",),
-            run.last_state[1],
-            {"long_name": "q of the last good state"},
-        )
-        file_variables["last_u"] = (
-            ("speed",),
-            run.last_state[2],
-            {"long_name": "u of the last good state"},
-        )
-    if run.start is not None:
-        for name, values, dimension in zip("qu", run.start, ("coordinate", "speed"), strict=True):
-            file_variables[f"start_{name}"] = (
-                (dimension,),
-                values,
-                {"long_name": f"initial {name}"},
-            )
+    states = {"last": (run.last_state or ())[1:], "start": run.start or ()}
+    texts = {"last": "{} of the last good state", "start": "initial {}"}
+    for prefix, state in states.items():
+        for name, dimension, values in zip("qu", ("coordinate", "speed"), state, strict=False):
+            description = {"long_name": texts[prefix].format(name)}
+            file_variables[f"{prefix}_{name}"] = ((dimension,), values, description)
     file_variables |= _error_variables(result.certificate.error)
     if run.settings.output_times is not None:
         times = np.array(run.settings.output_times)

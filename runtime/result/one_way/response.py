@@ -315,14 +315,9 @@ def _rerun_at_samples(model: CompiledScene, run: Trajectory, grid: Cells) -> Tra
         raise NumericalFailure(
             f"one-way response: the run could not be repeated: {repeated.message}"
         )
-    return _drop_event_rows(repeated, grid)
-
-
-def _drop_event_rows(run: Trajectory, grid: Cells) -> Trajectory:
-    """Rows of a run at the output times only."""
-    rows = np.searchsorted(run.t, grid.samples)
+    rows = np.searchsorted(repeated.t, grid.samples)  # without those of events
     keys = ("t", "q", "u", "memory", "work", "event")
-    return replace(run, **{key: getattr(run, key)[rows] for key in keys})
+    return replace(repeated, **{key: getattr(repeated, key)[rows] for key in keys})
 
 
 def _relative_jump(body: ModalBody, grid: Cells, loads: Array) -> float:
